@@ -115,7 +115,7 @@ def _runs(motions: Sequence[Any]) -> dict[str, dict[str, Any]]:
                     values = {each: getattr(result, each, None) for each in KEPT_OF_RUNS}
                     values = {**values, "outcome": str(result.outcome)}
                 except rbfrag.RbfragError as error:
-                    values = {"outcome": f"refused: {error}"}
+                    values = {"outcome": f"rejected: {error}"}
                 answers[f"{name}: {motion.sha256[:12]} {polarity}"] = values
     return answers
 

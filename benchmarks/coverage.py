@@ -24,10 +24,10 @@ from benchmarks.joint_failures import PAGE as RANGES_PAGE
 from benchmarks.model_acceptance import Mark, acceptance_table
 from benchmarks.page import ROOT, markdown, parser, write_table
 from rbfrag.db.location import REFERENCE
+from rbfrag.fragility.confidence import ParameterErrors, packed, quantiles_of
 from rbfrag.fragility.dependence import Dependence
 from rbfrag.fragility.fit.clusters import cr3, event_derivatives, jackknife_steps
 from rbfrag.fragility.fit.likelihood import Binomial, maximise
-from rbfrag.fragility.intervals import ParameterErrors, packed, quantiles_of
 from rbfrag.fragility.joint import COMPONENTS, overdispersion, share_range
 from rbfrag.fragility.joint_sampling import JointSampler
 from rbfrag.fragility.method import arrays

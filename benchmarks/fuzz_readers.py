@@ -2,7 +2,7 @@
 
 Every input is a file of one of the formats of accelerograms, or of another reader of the list in
 `benchmarks/readers.py`, after one to four random edits: bytes flipped, pieces put in or over, spans
-and lines dropped, doubled or swapped, numbers changed, ends cut off. A reader must refuse it in one
+and lines dropped, doubled or swapped, numbers changed, ends cut off. A reader must reject it in one
 printable sentence of less than 500 characters that names the file and a line of it, or read it;
 motions must then be fit for use: finite samples, a positive interval, measures and flags that can
 be computed.
@@ -77,7 +77,7 @@ class Tally:
     """What became of the inputs made from one kind of file."""
 
     inputs: int = 0
-    refused: int = 0
+    rejected: int = 0
     partial: int = 0
     slowest_s: float = 0.0
     reasons: Counter[str] = field(default_factory=Counter)
@@ -158,7 +158,7 @@ def failure(name: str, folder: Path, content: bytes, random: Random, tally: Tall
         else:
             reader.read(path)
     except RbfragError as error:
-        tally.refused += 1
+        tally.rejected += 1
         tally.reasons[type(error).__name__] += 1
         wrong = unclear(error, path, content)
     except Exception as error:  # noqa: BLE001  # whatever else is raised is what is looked for
@@ -183,7 +183,7 @@ def unfit(motion: GroundMotion) -> str:
     try:
         measures = motion.measures
     except InputError:
-        return ""  # absurd units are refused in words of their own when they are measured
+        return ""  # absurd units are rejected in words of their own when they are measured
     if not all(math.isfinite(value) for value in vars(measures).values() if value is not None):
         return f"measures that are not finite: {measures}"
     quality_flags(motion)
@@ -201,7 +201,7 @@ def unclear(error: RbfragError, path: Path, content: bytes) -> str:
     """Return what a message lacks; empty for a clear one."""
     text, line = str(error), getattr(error, "line", None)
     last = content.replace(b"\r\n", b"\n").replace(b"\r", b"\n").count(b"\n") + 1
-    # a record may be refused for the index beside it
+    # a record may be rejected for the index beside it
     if str(path.parent) not in text:
         return f"the message names no file: {text[:200]}"
     if not text.isprintable() or len(text) > MOST_CHARACTERS:
@@ -221,7 +221,7 @@ def note(silence: Silence, name: str, content: bytes, path: Path, random: Random
     if not became:
         return
     silence.changed += 1
-    silence.refused += became == "refused"
+    silence.rejected += became == "rejected"
     silence.remarked += became == "remarked"
     if became == "silent":
         silence.silent[kind] += 1
@@ -263,18 +263,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
     print(table(tallies))
     print(f"\n{table_of_silence(silences)}")
     total = sum(tally.inputs for tally in tallies.values())
-    refused = sum(tally.refused for tally in tallies.values())
-    print(f"\n{total} inputs: {refused} refused, {total - refused - failures} read, ", end="")
+    rejected = sum(tally.rejected for tally in tallies.values())
+    print(f"\n{total} inputs: {rejected} rejected, {total - rejected - failures} read, ", end="")
     print(f"{failures} failures (seed {chosen.seed})")
     return 1 if failures else 0
 
 
 def table(tallies: dict[str, Tally]) -> str:
     """Return what became of the inputs, a row a format."""
-    rows = ["| format | inputs | refused | read as partial | slowest [ms of processor] |",
+    rows = ["| format | inputs | rejected | read as partial | slowest [ms of processor] |",
             "| --- | --- | --- | --- | --- |"]  # fmt: skip
     rows += [
-        f"| {name} | {tally.inputs} | {tally.refused} | {tally.partial} "
+        f"| {name} | {tally.inputs} | {tally.rejected} | {tally.partial} "
         f"| {1000.0 * tally.slowest_s:.0f} |"
         for name, tally in tallies.items()
     ]

@@ -16,7 +16,7 @@ import numpy as np
 from scipy.special import ndtr
 
 from benchmarks.page import markdown, parser, report
-from rbfrag.fragility.lookup import suited_models
+from rbfrag.fragility.model_selection import suited_models
 from rbfrag.question.question import predict
 
 BLOCK = {"p2": 3.0, "kr": 0.1}

@@ -14,12 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.page import markdown, parser, report
+from rbfrag.fragility.confidence import ParameterErrors, packed, quantiles_of
 from rbfrag.fragility.fit.clusters import cr3, jackknife_steps, left_out
 from rbfrag.fragility.fit.data import fit_data
 from rbfrag.fragility.fit.likelihood import censored_line, from_olsen, maximise, most_likely
 from rbfrag.fragility.fit.line import Bins, iterate
 from rbfrag.fragility.fit.outcomes import outcome_rows, parameter_names
-from rbfrag.fragility.intervals import ParameterErrors, packed, quantiles_of
 from rbfrag.fragility.measures import TERMS
 from rbfrag.fragility.method import arrays
 from rbfrag.fragility.methods import method_named

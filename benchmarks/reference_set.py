@@ -247,7 +247,7 @@ def fitted_row(source: Path, options: dict[str, Any]) -> ModelRow:
 
 
 def examine(made: Path) -> None:
-    """Refuse to ship a file that is damaged, too large, or holds samples."""
+    """Reject to ship a file that is damaged, too large, or holds samples."""
     with opened_database(made, read_only=True) as engine, engine.connect() as connection:
         findings = list(check_database(connection))
         if findings:

@@ -23,11 +23,11 @@ from rbfrag.hazards.annual_rate import failure_rate
 from rbfrag.hazards.curve import HazardCurve, hazard_curve
 from rbfrag.hazards.event_means import event_means
 from rbfrag.hazards.event_set import Duration, EventSet
-from rbfrag.hazards.kernel import KernelBlocks, rates
 from rbfrag.hazards.losses import event_losses
-from rbfrag.hazards.mass import curve_mass
 from rbfrag.hazards.portfolio import Portfolio
-from rbfrag.hazards.shaking import LevelShaking
+from rbfrag.hazards.rate_density import curve_mass
+from rbfrag.hazards.rate_integration import KernelBlocks, rates
+from rbfrag.hazards.shaking import HazardLevel
 from rbfrag.question.components import component_named
 from rbfrag.question.keywords import model_for
 from rbfrag.question.question import predict
@@ -69,7 +69,7 @@ def of_curves(blocks: int, sites: int) -> None:
     """Rates with intervals under the curve of each site."""
     random = np.random.default_rng(1)
     curves = [curve_of(at=at) for at in random.uniform(0.5, 1.5, sites).tolist()]
-    shaking = LevelShaking.of(curves[0], component="rotd50")
+    shaking = HazardLevel.of(curves[0], component="rotd50")
     numbers = toppling(blocks, random)
     model = model_for({}, (*numbers, shaking.name), "toppling")
     site = random.integers(0, sites, blocks)
@@ -148,7 +148,7 @@ def exactness() -> list[list[str]]:
         curve = curve_of(measure, period)
         row = [name]
         for component in ("single", "rotd50"):
-            shaking = LevelShaking.of(curve, component=component)
+            shaking = HazardLevel.of(curve, component=component)
             model = model_for({}, (*numbers, shaking.name), kind)
             mass = curve_mass([[curve]], np.ones(1), shaking)
             ((_, own),) = KernelBlocks.of(model, shaking.median, numbers, np.zeros(BLOCKS, np.intp))
@@ -164,7 +164,7 @@ def exactness() -> list[list[str]]:
 
 
 def by_predict(
-    curve: HazardCurve, shaking: LevelShaking, model: FragilityModel, numbers: dict[str, FloatArray]
+    curve: HazardCurve, shaking: HazardLevel, model: FragilityModel, numbers: dict[str, FloatArray]
 ) -> FloatArray:
     """Return rates by a dense sum of predictions over the curve."""
     low, high = np.log(curve.levels[[0, -1]]).tolist()
@@ -193,7 +193,7 @@ def drawn_models(model: FragilityModel, n: int, seed: int) -> list[FragilityMode
 def intervals() -> list[list[str]]:
     """Return the interval of rates against draws of the parameters."""
     curve = curve_of()
-    shaking = LevelShaking.of(curve, component="rotd50")
+    shaking = HazardLevel.of(curve, component="rotd50")
     numbers = toppling(109, np.random.default_rng(3))
     model = model_for({}, (*numbers, shaking.name), "toppling")
     mass = curve_mass([[curve]], np.ones(1), shaking)

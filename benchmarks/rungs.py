@@ -20,8 +20,8 @@ from rbfrag.db.engine import opened_database
 from rbfrag.db.location import REFERENCE
 from rbfrag.db.motions import motion_rows
 from rbfrag.fragility.fit.data import read_source
-from rbfrag.fragility.lookup import find_model
 from rbfrag.fragility.measures import MEASURES
+from rbfrag.fragility.model_selection import find_model
 from rbfrag.fragility.prediction import array_answer
 from rbfrag.motions.readers import read_motions
 from rbfrag.motions.toppling_spectrum import toppling_spectrum

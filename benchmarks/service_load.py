@@ -115,13 +115,14 @@ def wrk(url: str, seconds: int, connections: int) -> Load:
     words = ["wrk", "-t1", f"-c{connections}", f"-d{seconds}s", "--latency", url]
     printed = subprocess.run(words, check=True, capture_output=True, text=True).stdout
     errors = re.search(r"Socket errors: connect (\d+), read (\d+), write (\d+), timeout", printed)
-    refused = re.search(r"Non-2xx or 3xx responses: (\d+)", printed)
+    rejected = re.search(r"Non-2xx or 3xx responses: (\d+)", printed)
     return Load(
         per_s=float(_found(r"Requests/sec:\s+([\d.]+)", printed)[0]),
         p50_ms=_milliseconds(printed, "50"),
         p99_ms=_milliseconds(printed, "99"),
         answers=int(_found(r"(\d+) requests in", printed)[0]),
-        bad=(int(refused[1]) if refused else 0) + (sum(map(int, errors.groups())) if errors else 0),
+        bad=(int(rejected[1]) if rejected else 0)
+        + (sum(map(int, errors.groups())) if errors else 0),
     )
 
 

@@ -36,9 +36,9 @@ from rbfrag.db.location import REFERENCE
 from rbfrag.db.model_file import ModelRow, held_out_loss
 from rbfrag.fragility.fit.likelihood import Binomial, most_likely
 from rbfrag.fragility.fit.scores import CLIP
-from rbfrag.fragility.lookup import stored_rows
 from rbfrag.fragility.measures import TERMS
 from rbfrag.fragility.method import LOGIT
+from rbfrag.fragility.model_selection import stored_rows
 from rbfrag.solver.integrator.free_rocking import STABLE, TOPPLED
 from rbfrag.solver.models.rocking import MODEL as ROCKING
 from rbfrag.vocabulary.quantities import SPECTRAL

@@ -1,7 +1,7 @@
 """Header numbers of accelerograms changed by a factor, and whether anybody would notice.
 
-A change is silent if the file is read without refusal and without a remark that the sound file has
-not, although its samples are now read otherwise (interval, number, most of the values) or the
+A change is silent if the file is read without rejection and without a warning that the sound file
+lacks, although its samples are now read otherwise (interval, number, most of the values) or the
 number is a duration, interval, scale or peak that the format states besides.
 """
 
@@ -36,7 +36,7 @@ class Silence:
     """What became of changed header numbers of one format."""
 
     changed: int = 0
-    refused: int = 0
+    rejected: int = 0
     remarked: int = 0
     silent: Counter[str] = field(default_factory=Counter)
     lines: Counter[str] = field(default_factory=Counter)
@@ -59,7 +59,7 @@ def change(
     """Change one number of a header, and read the file.
 
     Returns:
-        What became of it (``""`` for nothing, ``refused``, ``remarked``, ``silent``), the kind of
+        What became of it (``""`` for nothing, ``rejected``, ``remarked``, ``silent``), the kind of
         number, and its line.
     """
     found = list(NUMBER.finditer(content[:HEADER_BYTES]))
@@ -87,7 +87,7 @@ def change(
     try:
         motions = read_motions(path, units=units, dt_s=dt_s, gain=gain)
     except RbfragError:
-        return "refused", kind, line
+        return "rejected", kind, line
     finally:
         path.unlink()
     if kind == OTHER and _alike(whole, motions):
@@ -145,12 +145,12 @@ def _alike(whole: list[GroundMotion], motions: list[GroundMotion]) -> bool:
 
 def table(silences: dict[str, Silence]) -> str:
     """Return what became of the changed numbers, a row a format, and the lines of silent ones."""
-    rows = ["| format | header numbers changed | refused | remarked | silent |",
+    rows = ["| format | header numbers changed | rejected | remarked | silent |",
             "| --- | --- | --- | --- | --- |"]  # fmt: skip
     for name, each in silences.items():
         kinds = ", ".join(f"{number} {kind}" for kind, number in sorted(each.silent.items()))
         rows.append(
-            f"| {name} | {each.changed} | {each.refused} | {each.remarked} | {kinds or 0} |"
+            f"| {name} | {each.changed} | {each.rejected} | {each.remarked} | {kinds or 0} |"
         )
     silent = [
         f"{name}: {line[:100]}"

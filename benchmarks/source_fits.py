@@ -23,9 +23,9 @@ from rbfrag.db.location import REFERENCE
 from rbfrag.db.rows import CombinationTable
 from rbfrag.fragility.fit.data import read_source
 from rbfrag.fragility.fit.line import Bins, bin_variances, powers, weighted_line
-from rbfrag.fragility.lookup import find_model
 from rbfrag.fragility.measures import MEASURES
 from rbfrag.fragility.model import FragilityModel
+from rbfrag.fragility.model_selection import find_model
 from rbfrag.fragility.prediction import array_answer
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.plots import canvas

@@ -76,7 +76,7 @@ def _walk(
 
 
 def _context(command: Any, name: str, parent: Any = None) -> Any:
-    from rbfrag.cli.parameters.stack import ALL_OPTIONS
+    from rbfrag.cli.parameters.option_groups import ALL_OPTIONS
 
     context = command.context_class(
         command,

@@ -18,11 +18,11 @@ from rbfrag.exchange.map_answer import shakemap as shakemap
 from rbfrag.exchange.mesh_file import block_from_mesh as block_from_mesh
 from rbfrag.exchange.release import write_release_rates as write_release_rates
 from rbfrag.fragility.fit.stored import fit as fit
-from rbfrag.hazards.answer import hazard as hazard
 from rbfrag.hazards.curve import HazardCurve as HazardCurve
 from rbfrag.hazards.curve_file import read_hazard_curves as read_hazard_curves
 from rbfrag.hazards.hazard_answer import BranchRate as BranchRate
 from rbfrag.hazards.hazard_answer import HazardAnswer as HazardAnswer
+from rbfrag.hazards.hazard_rates import hazard as hazard
 from rbfrag.hazards.joint_rate import CountRate as CountRate
 from rbfrag.hazards.joint_rate import JointRate as JointRate
 from rbfrag.hazards.loss_answer import LossAnswer as LossAnswer

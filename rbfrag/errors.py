@@ -107,7 +107,7 @@ class UnknownFieldError(InputError, TypeError):
     """An unknown keyword."""
 
     @classmethod
-    def refuse(cls, names: Iterable[str], typed_dict: type, subject: str) -> None:
+    def reject(cls, names: Iterable[str], typed_dict: type, subject: str) -> None:
         """Reject keywords that are not keys of a TypedDict.
 
         Args:

@@ -19,7 +19,7 @@ from typing import Any
 from rbfrag.errors import InputError
 
 MOST_BYTES = 1 << 28
-"""Larger texts are refused: no curve, model or description is 256 MB long."""
+"""Larger texts are rejected: no curve, model or description is 256 MB long."""
 
 LONGEST_FILE_NAME = 240
 """Bytes: file systems take 255, of which the name of the unfinished file needs some more."""
@@ -127,7 +127,7 @@ def source_text(
     Args:
         path: the file.
         description: as for :func:`reading`.
-        most_bytes: larger files are refused.
+        most_bytes: larger files are rejected.
 
     Raises:
         InputError: the file cannot be read, is empty, too large or not text (UTF-8).
@@ -177,7 +177,7 @@ def toml_document(text: str, source: str | os.PathLike[str] | None = None) -> di
         raise InputError(f"{named}unsupported TOML: a key of more than 20 parts")
     try:
         document = tomllib.loads(text)
-        _refuse_large([document])
+        _reject_large([document])
     except RecursionError:
         raise InputError(f"{named}unsupported TOML: tables nested too deeply") from None
     # beside its own error, the parser passes on that of an integer of thousands of digits
@@ -186,11 +186,11 @@ def toml_document(text: str, source: str | os.PathLike[str] | None = None) -> di
     return document
 
 
-def _refuse_large(values: Iterable[object]) -> None:
+def _reject_large(values: Iterable[object]) -> None:
     """Reject an integer too large for a float, at any depth."""
     for value in values:
         if isinstance(value, dict | list):
-            _refuse_large(value.values() if isinstance(value, dict) else value)
+            _reject_large(value.values() if isinstance(value, dict) else value)
         elif isinstance(value, int) and not isinstance(value, bool) and not is_number(value):
             raise ValueError("an integer of more than 308 digits")
 
@@ -274,7 +274,7 @@ def written_whole(target: Path, label: str = "file") -> Iterator[Path]:
         label: what messages call it.
 
     Raises:
-        InputError: the disk refuses.
+        InputError: the disk rejects.
     """
     partial = target.with_name(f".{target.stem}.{secrets.token_hex(4)}.part{target.suffix}")
     try:
@@ -293,7 +293,7 @@ def write_text(text: str, target: Path) -> None:
     """Write a text (UTF-8) atomically.
 
     Raises:
-        InputError: the disk refuses.
+        InputError: the disk rejects.
     """
     with written_whole(target) as partial:
         partial.write_text(text, encoding="utf-8", newline="\n")

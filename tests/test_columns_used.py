@@ -416,8 +416,8 @@ def test_a_missing_width_names_the_column_that_may_be_it() -> None:
 
 def test_ignore_columns_overrules(shell: Shell) -> None:
     Path("a.csv").write_text("height_m,width_m,phi,dip quality,pgv_m_s\n2,0.4,38,good,0.6\n")
-    refused = shell("predict", "--blocks", "a.csv", expect=2).stderr
-    assert "'dip quality' is unknown; for the dip of the base" in refused
+    rejected = shell("predict", "--blocks", "a.csv", expect=2).stderr
+    assert "'dip quality' is unknown; for the dip of the base" in rejected
     told = shell.json("predict", "--blocks", "a.csv", "--ignore-columns", "dip quality")
     assert "column ignored: dip quality" in told["warnings"]
     assert "unknown column 'depth'" in shell(

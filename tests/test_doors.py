@@ -1,4 +1,4 @@
-"""One question through every door: the same answer, or the same refusal in the door's words."""
+"""One question through every door: the same answer, or the same rejection in the door's words."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from rbfrag.db.location import REFERENCE
 from rbfrag.errors import InputError, RbfragError
 from rbfrag.exchange.block_rows import read_blocks
 from rbfrag.exchange.table_answers import predict_table
-from rbfrag.fragility.lookup import SHIPPED
+from rbfrag.fragility.model_selection import SHIPPED
 from rbfrag.fragility.prediction import Prediction
 from rbfrag.fragility.prediction_array import PredictionArray
 from rbfrag.hazards.curve import HazardCurve
@@ -212,7 +212,7 @@ def expected_of(i: int) -> Told:
 
 
 def same_reason(told: str, expected: str, spell: Callable[[str], str]) -> bool:
-    """Return whether a refusal says what Python's says, its fields as a door spells them."""
+    """Return whether a rejection says what Python's says, its fields as a door spells them."""
     shown = expected
     for name in sorted(PHYSICAL, key=len, reverse=True):
         for each in (spell(name), name):
@@ -238,7 +238,7 @@ def test_the_shell_answers_likewise(shell: Shell) -> None:
         status = 0 if expected.numbers else 2
         result = shell("predict", *options, *kind, "--json", expect=status)
         if not expected.numbers:
-            assert result.stderr.strip() == f"rbfrag: {spelled_refusal(question, option_of)}"
+            assert result.stderr.strip() == f"rbfrag: {spelled_rejection(question, option_of)}"
             continue
         told = json.loads(result.stdout)
         numbers = tuple(math.nan if told[name] is None else told[name] for name in NUMBERS)
@@ -266,7 +266,7 @@ def test_arrays_answer_likewise() -> None:
 
 
 @pytest.mark.parametrize("size", [None, 2])
-def test_what_the_blocks_do_not_read_is_refused_alone_and_in_arrays(size: int | None) -> None:
+def test_what_the_blocks_do_not_read_is_rejected_alone_and_in_arrays(size: int | None) -> None:
     question: dict[str, Any] = {"height_m": 2.0, "width_m": 0.4, "phi_deg": 35.0, "pgv_m_s": 0.6}
     if size is not None:
         question = {name: np.full(size, value) for name, value in question.items()}
@@ -373,16 +373,16 @@ def parameters(question: dict[str, Any]) -> dict[str, Any]:
     return {parameter_of(name): value for name, value in question.items()}
 
 
-def refusal_of(question: dict[str, Any]) -> str:
-    """Return why Python refuses a question, as a request is told."""
-    return spelled_refusal(question, parameter_of).replace(SHIPPED, "the database")
+def rejection_of(question: dict[str, Any]) -> str:
+    """Return why Python rejects a question, as a request is told."""
+    return spelled_rejection(question, parameter_of).replace(SHIPPED, "the database")
 
 
-def spelled_refusal(question: dict[str, Any], spell: Callable[[str], str]) -> str:
-    """Return why Python refuses a question, its fields as a door spells them."""
-    with pytest.raises(RbfragError) as refused:
+def spelled_rejection(question: dict[str, Any], spell: Callable[[str], str]) -> str:
+    """Return why Python rejects a question, its fields as a door spells them."""
+    with pytest.raises(RbfragError) as rejected:
         rbfrag.predict(**question)
-    error = refused.value
+    error = rejected.value
     return error.spelled(spell) if isinstance(error, InputError) else str(error)
 
 
@@ -393,7 +393,7 @@ def test_requests_for_one_block_answer_likewise(client: TestClient) -> None:
         told = response.json()
         if response.status_code != 200:
             assert response.status_code == 422, (words(question), told)
-            assert told["detail"] == refusal_of(question), words(question)
+            assert told["detail"] == rejection_of(question), words(question)
             continue
         numbers = tuple(math.nan if told[name] is None else told[name] for name in NUMBERS)
         agree(Told(numbers, told["kind"], told["mode"], ""), expected, question)
@@ -410,7 +410,7 @@ def test_requests_for_many_blocks_answer_likewise(client: TestClient) -> None:
         told = response.json()
         if response.status_code != 200:
             assert response.status_code == 422, (words(question), told)
-            assert told["detail"] == refusal_of(arrays), words(question)
+            assert told["detail"] == rejection_of(arrays), words(question)
             continue
         whole = rbfrag.predict(**arrays)
         assert isinstance(whole, PredictionArray)
@@ -458,7 +458,7 @@ def test_what_is_typed_into_the_page_is_answered_likewise(
             expect(page.locator("#probability")).to_have_attribute("data-state", "none")
             if "at rest" not in expected.reason:  # which the page says of its drawing
                 said = "async (said) => (await import('/js/fields.js')).inLabels(said)"
-                assert opened.text("#sentence") == page.evaluate(said, refusal_of(question))
+                assert opened.text("#sentence") == page.evaluate(said, rejection_of(question))
             continue
         opened.settled()
         if "displacement_m" in question:  # asked for once the block is known to slide
@@ -498,7 +498,7 @@ def of_losses(block: dict[str, Any], job: Path) -> tuple[str, str, float | None]
 
 
 @pytest.mark.parametrize("ask", [of_hazard, of_survival, of_losses])
-def test_rates_and_losses_are_of_the_same_kinds_and_refuse_the_same_blocks(
+def test_rates_and_losses_are_of_the_same_kinds_and_reject_the_same_blocks(
     ask: Callable[[dict[str, Any], Path], tuple[str, str, float | None]], job: Path
 ) -> None:
     for i, question in enumerate(QUESTIONS):
@@ -510,9 +510,9 @@ def test_rates_and_losses_are_of_the_same_kinds_and_refuse_the_same_blocks(
         block = {"component": "single", **question}
         del block["pgv_m_s"]
         if expected.numbers in ((), UNSTABLE_AT_REST):
-            with pytest.raises(RbfragError) as refused:
+            with pytest.raises(RbfragError) as rejected:
                 ask(block, job)
-            told = str(refused.value)
+            told = str(rejected.value)
             assert (
                 (expected.numbers == UNSTABLE_AT_REST and "at rest" in told)
                 or same_reason(told, expected.reason, str)
@@ -571,7 +571,7 @@ UNSTABLE = {"height_m": 2.0, "width_m": 0.2, "beta_deg": 10.0}
 def test_no_critical_value_of_a_block_that_is_unstable_at_rest(
     tmp_path: Path, shell: Shell, planes: dict[str, float], kind: str | None
 ) -> None:
-    """`critical` refuses it in the words of `respond`, in the shell, in Python and over HTTP."""
+    """`critical` rejects it in the words of `respond`, in the shell, in Python and over HTTP."""
     record = write_at2(tmp_path / "record.AT2", shaking(3))
     (motion,) = rbfrag.read_motions(record)
     words = [
@@ -582,12 +582,12 @@ def test_no_critical_value_of_a_block_that_is_unstable_at_rest(
     asked = ("--kind", kind) if kind else ()
     needs_friction = not planes and kind not in (None, "toppling")
     if not needs_friction:
-        refusals = [
+        rejections = [
             shell(command, record, *words, *asked, expect=2).stderr.strip().splitlines()[-1]
             for command in ("respond", "critical")
         ]
-        assert refusals[0] == refusals[1]
-        assert "unstable at rest" in refusals[0]
+        assert rejections[0] == rejections[1]
+        assert "unstable at rest" in rejections[0]
     # Python, of a block object
     block = Block.rectangle(2.0, 0.2)
     if planes:

@@ -96,7 +96,7 @@ def test_a_curve_is_given_by_its_file_its_path_or_itself(tmp_path) -> None:
         (lambda: rbfrag.respond_draws(3, p2=3.0, kr=0.1), "motion is of type int"),
     ],
 )
-def test_what_is_no_file_and_no_answer_is_refused_by_its_name(ask, message) -> None:
+def test_what_is_no_file_and_no_answer_is_rejected_by_its_name(ask, message) -> None:
     with pytest.raises(rbfrag.InputError, match=message):
         ask()
 
@@ -127,7 +127,7 @@ def test_every_answer_is_a_table_and_one_line(tmp_path) -> None:
 
 
 @pytest.mark.parametrize("name", ["motion", "vertical"])
-def test_a_motion_is_named_by_its_file_or_refused_by_name(tmp_path, name: str) -> None:
+def test_a_motion_is_named_by_its_file_or_rejected_by_name(tmp_path, name: str) -> None:
     record = write_at2(tmp_path / "record.AT2", shaking(3))
     motion = rbfrag.read_motions(record)[0]
     for given in (record, str(record), f"{record}#0"):

@@ -132,7 +132,7 @@ outcomes = [
 try:
     rbfrag.critical(motion, kind="padded", p2=3.0)
 except InputError as error:
-    refused = str(error)
+    rejected = str(error)
 first = rbfrag.simulate("motions.db", kind="padded", jobs=1)
 again = rbfrag.simulate("motions.db", kind="padded", jobs=1)
 fitted = rbfrag.fit("motions.db", kind="padded", term="pgv").model.row
@@ -146,7 +146,7 @@ with TestClient(make_app(ServiceSettings(db="motions.db"))) as client:
     http = client.get("/v1/predict", params=asked)
 print(json.dumps({
     "outcomes": outcomes,
-    "refused": refused,
+    "rejected": rejected,
     "stored": [first.combinations, first.not_searched, again.resumed],
     "model": [fitted.kind, fitted.method, fitted.name],
     "single": [each.probability for each in single],
@@ -208,7 +208,7 @@ def run(folder: Path, *arguments: str) -> str:
 def test_it_answers_by_every_door(folder: Path) -> None:
     told = json.loads(run(folder, "-c", ASKED))
     assert told["outcomes"] == ["toppled", "stable"]
-    assert "no critical values of kind padded are computed" in told["refused"]
+    assert "no critical values of kind padded are computed" in told["rejected"]
     assert told["stored"] == [12 * 2 * 4] * 3
     kind, method, name = told["model"]
     assert (kind, method) == ("padded", "pads")

@@ -25,7 +25,7 @@ def study(combinations: Sequence[Combination]) -> dict[str, Any]:
     counts = {"found": 0, "below_limit": 0, "no_motion": 0, "outside_model": 0}
     certified = ordered = slivers = 0
     missed: list[str] = []
-    refused: list[str] = []
+    rejected: list[str] = []
     widths: list[float] = []
     seconds: list[float] = []
     for one in combinations:
@@ -44,7 +44,7 @@ def study(combinations: Sequence[Combination]) -> dict[str, Any]:
             if not result.certified:
                 missed.append(one.name)
         elif not result.certified:
-            refused.append(one.name)
+            rejected.append(one.name)
         if result.upper is not None and result.lower is not None:
             widths.append((result.upper - result.lower) / result.upper)
     median, ninety, ninety_nine, greatest = np.quantile(seconds, (0.5, 0.9, 0.99, 1.0)) * 1e3
@@ -54,7 +54,7 @@ def study(combinations: Sequence[Combination]) -> dict[str, Any]:
         "certified": certified,
         "order_kept_by_the_record": ordered,
         "of_these_not_certified": missed,
-        "order_not_kept_and_not_certified": refused,
+        "order_not_kept_and_not_certified": rejected,
         "certified_with_slivers": slivers,
         "widest_bracket": max(widths, default=0.0),
         "ms_median": float(median),

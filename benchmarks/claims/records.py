@@ -18,8 +18,8 @@ from benchmarks.claims.claim import (
 )
 from rbfrag.db.rows import CombinationTable
 from rbfrag.errors import FitError
+from rbfrag.fragility.confidence import student_half_width
 from rbfrag.fragility.fit.fitting import fit
-from rbfrag.fragility.intervals import student_half_width
 from rbfrag.fragility.measures import TERMS
 from rbfrag.plots.critical_strength import pulse_line
 

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from sqlalchemy import Connection, Engine
 
-from rbfrag.campaign.traced_file import Trace, missing_files, read_traces
+from rbfrag.campaign.record_metadata import Trace, missing_files, read_traces
 from rbfrag.db.engine import opened_database
 from rbfrag.db.motions import add_motion, motion_row, same_source
 from rbfrag.db.rows import EarthquakeInfo
@@ -173,7 +173,7 @@ def add_motions(
         suite: suite to put the motions into.
         metadata: CSV that states, by file and trace, earthquake, units and direction.
         units: unit of files that do not state it; one that states another is read by what it
-            states, with a warning, and refused where it is the only file; it overrides a unit
+            states, with a warning, and rejected where it is the only file; it overrides a unit
             that the file's own peak contradicts.
         dt_s: sampling interval [s] of text files that hold accelerations only; it overrides one
             that the file's own duration contradicts.
@@ -333,7 +333,7 @@ def _records(file: Path) -> list[Path]:
     try:
         return members_of(file) if is_archive(file) else [file]
     except MotionFileError:
-        # refused with the reason when it is read
+        # rejected with the reason when it is read
         return [file]
 
 

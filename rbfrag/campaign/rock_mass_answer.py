@@ -14,7 +14,7 @@ from rbfrag.campaign.shake_rockmass import shake
 from rbfrag.campaign.summary import CampaignProgress
 from rbfrag.errors import InputError, UnknownFieldError
 from rbfrag.files import as_path
-from rbfrag.fragility.intervals import checked_level
+from rbfrag.fragility.confidence import checked_level
 from rbfrag.fragility.measures import spectral
 from rbfrag.fragility.model import Model
 from rbfrag.motions.polarity import Polarity
@@ -328,7 +328,7 @@ def rockmass(
         UnknownModelError: no model of that name.
         DatabaseError: the database cannot be read.
     """
-    UnknownFieldError.refuse(question, RockMassQuestion, "a rock mass")
+    UnknownFieldError.reject(question, RockMassQuestion, "a rock mass")
     blocks = _rock_mass(mass).realise(n, seed)
     options: dict[str, Any] = {name: value for name, value in question.items() if value is not None}
 

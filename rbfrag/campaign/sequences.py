@@ -11,11 +11,11 @@ from typing import Any
 
 from sqlalchemy import Engine
 
-from rbfrag.campaign.carry_out import Workforce
 from rbfrag.campaign.horizontal_motions import MotionChoice, horizontal_motions
 from rbfrag.campaign.kind import Case, Sequences
 from rbfrag.campaign.kinds import campaign_of_kind
 from rbfrag.campaign.motion_pairs import MotionPair, motion_pairs
+from rbfrag.campaign.runner import Workforce
 from rbfrag.campaign.summary import CampaignSummary, SequenceReport
 from rbfrag.db.engine import opened_database
 from rbfrag.db.keys import pair_key

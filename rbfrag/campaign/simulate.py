@@ -10,7 +10,6 @@ from typing import Any, Literal, TypedDict, Unpack
 
 from sqlalchemy import Engine
 
-from rbfrag.campaign.carry_out import Workforce
 from rbfrag.campaign.executors.local import check_workers
 from rbfrag.campaign.horizontal_motions import MotionChoice
 from rbfrag.campaign.interrupt import Stopped, never
@@ -26,6 +25,7 @@ from rbfrag.campaign.plan import (
     remaining_work,
     strengths_of,
 )
+from rbfrag.campaign.runner import Workforce
 from rbfrag.campaign.sequences import sequences_of_kind, simulate_sequences
 from rbfrag.campaign.summary import CampaignProgress as CampaignProgress
 from rbfrag.campaign.summary import CampaignSummary as CampaignSummary
@@ -96,7 +96,7 @@ def simulate(
 
     Args:
         db: the database (path, URL, or None for the default).
-        kind: what the blocks do; an option of another kind is refused.
+        kind: what the blocks do; an option of another kind is rejected.
         suite: only the motions of this suite.
         p2: toppling and rocking: frequency parameters p² [1/s²]; None for 30, 10, 3, 1, 0.3 and
             0.1.
@@ -134,7 +134,7 @@ def simulate(
         WorkFailedError: a worker died; what was finished is stored.
         StoppedError: `stopped` said so; what was finished is stored.
     """
-    UnknownFieldError.refuse(request, CampaignOptions, "a campaign")
+    UnknownFieldError.reject(request, CampaignOptions, "a campaign")
     check_workers(jobs, scheduler)
     workforce = Workforce(jobs, scheduler, on_progress, stopped)
     suite, vertical = request.get("suite"), request.get("vertical", "without")

@@ -17,7 +17,7 @@ try:
     import typer
     from typer.core import TyperGroup
 
-    from rbfrag.cli.parameters.stack import read_plainly
+    from rbfrag.cli.parameters.option_groups import read_plainly
     from rbfrag.cli.streams import end_unwritten, write_plainly
     from rbfrag.errors import InputError, RbfragError
     from rbfrag.version import __version__

@@ -5,7 +5,7 @@ from __future__ import annotations
 from difflib import get_close_matches
 from typing import Any
 
-from rbfrag.cli.parameters.stack import name_in_errors
+from rbfrag.cli.parameters.option_groups import name_in_errors
 from rbfrag.errors import one_paragraph
 from rbfrag.vocabulary.quantities import name_of, option_of
 

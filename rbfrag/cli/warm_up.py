@@ -16,8 +16,8 @@ from rbfrag.db.engine import opened_database
 from rbfrag.db.motions import add_motion
 from rbfrag.db.rows import EarthquakeInfo
 from rbfrag.exchange.event_losses import losses
-from rbfrag.hazards.answer import hazard
 from rbfrag.hazards.curve import HazardCurve
+from rbfrag.hazards.hazard_rates import hazard
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.toppling_spectrum import toppling_spectrum
 from rbfrag.solver.excitation import kept_excitation

@@ -114,7 +114,7 @@ def _server_engine(url: URL, read_only: bool) -> Engine:
 
 
 def _connected(_dialect: object, _record: object, cargs: Any, cparams: Any) -> Any:
-    from rbfrag.db.patience import PatientConnection
+    from rbfrag.db.connection_watchdog import PatientConnection
 
     return PatientConnection.connect(*cargs, **cparams)
 

@@ -141,7 +141,7 @@ def update_rows(
         DatabaseError: such a row was altered; a digest of the changed row would hide that.
     """
     for row in connection.execute(select(table).where(where).with_for_update()).mappings().all():
-        refuse_altered(table, {**row})
+        reject_altered(table, {**row})
         changed = _digested(table, {**row, **values})
         connection.execute(
             update(table)
@@ -166,7 +166,7 @@ def keep_writers_out(connection: Connection) -> None:
         connection.exec_driver_sql(f"LOCK TABLE {names} IN SHARE ROW EXCLUSIVE MODE")
 
 
-def refuse_altered(table: Table, row: Mapping[str, Any]) -> None:
+def reject_altered(table: Table, row: Mapping[str, Any]) -> None:
     """Reject a row whose values differ from those written."""
     try:
         sound = _digested(table, row)["digest"] == row["digest"]

@@ -67,7 +67,7 @@ COLUMNS = tuple(column.name for column in fields(ModelRow))
 """The columns that make a model, in the order of :func:`decode_model`."""
 
 STORED = (*COLUMNS, "digest")
-"""The columns that are read back: with the digest, by which an altered model is refused."""
+"""The columns that are read back: with the digest, by which an altered model is rejected."""
 
 _SELECT = f"SELECT {', '.join(STORED)} FROM fragility_model"
 
@@ -75,7 +75,7 @@ _TYPES: Mapping[str, ValueType] = {"is_default": "boolean", "form": "integer"}
 """Types of the columns for the digest; all others are texts."""
 
 
-def refuse_taken(name: str, taken: Collection[str]) -> None:
+def reject_taken(name: str, taken: Collection[str]) -> None:
     """Reject the name of an existing model."""
     if name in taken:
         raise InputError(

@@ -14,7 +14,7 @@ from rbfrag.db.model_file import (
     decode_model,
     encode_model,
     recommended,
-    refuse_taken,
+    reject_taken,
     unknown_model,
     with_defaults,
 )
@@ -42,7 +42,7 @@ def save_model(connection: Connection, row: ModelRow, *, replace: bool = False) 
     query = select(fragility_model.c.name, fragility_model.c.is_default)
     chosen = {other.name: bool(other.is_default) for other in connection.execute(query)}
     if not replace:
-        refuse_taken(row.name, chosen)
+        reject_taken(row.name, chosen)
     values["is_default"] = row.is_default or chosen.get(row.name, False)
     # first of all: a damaged model may be replaced, but not changed
     delete_rows(connection, fragility_model, fragility_model.c.name == row.name)

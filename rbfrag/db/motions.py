@@ -39,7 +39,7 @@ _LABELS = (
 _NUMBERS = ("orientation_deg", "dt_s", "npts", *COMPUTED, "trace_index")
 # Sums over some 1e5 samples, in another order on another processor.
 _ROUNDING = 1e-9
-_ID_LIMIT = 2**31  # drivers refuse larger integers in words of their own
+_ID_LIMIT = 2**31  # drivers reject larger integers in words of their own
 
 
 def add_motion(
@@ -64,7 +64,7 @@ def add_motion(
     Where it is there already, a stated earthquake replaces a guessed one together with all
     labels (recording, station, component, vertical or not, processing, flags); a guess replaces
     nothing; what was stated before stays, and stating another earthquake or direction is
-    refused.
+    rejected.
 
     Args:
         motion: equally spaced samples [g].
@@ -118,7 +118,7 @@ def add_motion(
             update_rows(connection, schema.motion, schema.motion.c.id == stored["id"], labels)
             delete_orphans(connection, stored["recording_id"])
         elif not earthquake.guessed:
-            _refuse_contradiction(motion, stored, earthquake, is_vertical)
+            _reject_contradiction(motion, stored, earthquake, is_vertical)
     if suite is not None:
         add_to_suite(connection, suite, stored["id"])
     return stored["id"], new
@@ -322,7 +322,7 @@ def delete_orphans(connection: Connection, recording_id: int) -> None:
     delete_rows(connection, event, event.c.id == event_id, event.c.guessed, ~used)
 
 
-def _refuse_contradiction(
+def _reject_contradiction(
     motion: GroundMotion, stored: RowMapping, info: EarthquakeInfo, is_vertical: bool
 ) -> None:
     name = motion.source_file or motion.label

@@ -94,7 +94,7 @@ def connect_sqlite(
         except sqlite3.Error as error:
             if not read_only or _primary_code(error) not in (_READONLY, _CANTOPEN):
                 raise
-            _refuse_unreadable_log(path)
+            _reject_unreadable_log(path)
             return _connect(path, "mode=ro&immutable=1", True, check_same_thread)
     except (sqlite3.Error, UnicodeDecodeError) as error:
         raise explained_sqlite_error(error, path) from error
@@ -121,7 +121,7 @@ def _connect(path: Path, mode: str, read_only: bool, check_same_thread: bool) ->
     return connection
 
 
-def _refuse_unreadable_log(path: Path) -> None:
+def _reject_unreadable_log(path: Path) -> None:
     log = path.with_name(path.name + "-wal")
     if log.exists() and log.stat().st_size > 0:
         raise DatabaseReadOnlyError(
@@ -200,7 +200,7 @@ def explained_sqlite_error(
             f"{path} cannot be read or written: {error}; what was finished is kept: check disk and "
             "quota and run the same command again"
         )
-    return DatabaseError(f"{path}: the database refused: {error}")
+    return DatabaseError(f"{path}: the database rejected: {error}")
 
 
 def _primary_code(error: sqlite3.Error) -> int | None:

@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 
 from rbfrag.errors import InputError
 from rbfrag.exchange.block_table import opened_table
-from rbfrag.fragility.unusable import in_list
-from rbfrag.question.blocks import has_shape
-from rbfrag.question.many import many_blocks
+from rbfrag.fragility.invalid_rows import in_list
+from rbfrag.question.classify import has_shape
+from rbfrag.question.classify_arrays import classify_blocks
 from rbfrag.vocabulary.quantities import BLOCK
 
 FloatArray = NDArray[np.float64]
@@ -44,8 +44,8 @@ def read_draws(path: str | os.PathLike[str]) -> tuple[dict[str, FloatArray], Flo
     size = next(iter(drawn.values())).size
     if has_shape(drawn):
         with table.named():
-            blocks = many_blocks(drawn, size, rows=True)
-        for group in (*blocks.refused, *blocks.unstable):
+            blocks = classify_blocks(drawn, size, rows=True)
+        for group in (*blocks.rejected, *blocks.unstable):
             raise InputError(f"{path}: draw {group.indices[0] + 1}: {group.texts()[0]}")
         if len(blocks.groups) > 1:
             kinds = " and ".join(str(group.kind) for group in blocks.groups)

@@ -15,11 +15,11 @@ from numpy.typing import NDArray
 from rbfrag.errors import InputError, MissingExtraError
 from rbfrag.exchange.block_table import TEXTS, opened_table
 from rbfrag.files import as_path
-from rbfrag.fragility.unusable import refuse, unusable_in_words
-from rbfrag.question.answers import block_reasons_of
-from rbfrag.question.many import many_blocks
+from rbfrag.fragility.invalid_rows import describe_invalid, reject
+from rbfrag.question.classify_arrays import classify_blocks
+from rbfrag.question.predict_arrays import block_reasons_of
 from rbfrag.question.question import is_wet, without_water
-from rbfrag.question.shapes import OF_A_SHAPE, PLANE_TEXTS
+from rbfrag.question.shape_validation import OF_A_SHAPE, PLANE_TEXTS
 from rbfrag.results.diagnostic import diagnostics
 from rbfrag.solver.kinds import KINDS, facts_of
 from rbfrag.vocabulary.quantities import BLOCK, BY_ROW, NUMBERS, column_of
@@ -63,7 +63,7 @@ class BlockRows:
         return {name: column[sound] for name, column in self.columns.items()}
 
     @cached_property
-    def refused(self) -> Columns:
+    def rejected(self) -> Columns:
         """Columns of the rejected rows, with their ``reason``."""
         wrong = self.reasons != ""
         columns = {**self.columns, "reason": self.reasons}
@@ -72,16 +72,16 @@ class BlockRows:
     @property
     def row_labels(self) -> list[str]:
         """Positions of the rejected rows: "line 3 (block A7)"."""
-        lines, names = self.refused["line"].tolist(), self.refused["block_id"].tolist()
+        lines, names = self.rejected["line"].tolist(), self.rejected["block_id"].tolist()
         return [
             f"{self.word} {line}" + (f" (block {name})" if self.named and name else "")
             for line, name in zip(lines, names, strict=True)
         ]
 
     @property
-    def refused_count(self) -> int:
+    def rejected_count(self) -> int:
         """Number of rejected rows."""
-        return int(self.refused["row"].size)
+        return int(self.rejected["row"].size)
 
     def without(self, wrong: NDArray[np.bool_], reason: Callable[[int], str]) -> BlockRows:
         """Return the table with additional rejected rows.
@@ -104,8 +104,8 @@ class BlockRows:
         """Return the table itself; reject one without usable blocks, or with zero total weight."""
         if not self.reasons.size:
             raise InputError(NO_BLOCK.format(self.source))
-        if self.refused_count == self.reasons.size:
-            self._refuse("")
+        if self.rejected_count == self.reasons.size:
+            self._reject("")
         weight = self.blocks.get("weight")
         if weight is not None and not weight.sum() > 0.0:
             raise InputError(f"{self.source}: the weights of the blocks sum to zero")
@@ -117,22 +117,22 @@ class BlockRows:
         Args:
             why: the reason for which the others do not do.
         """
-        if self.refused_count:
-            self._refuse(why)
+        if self.rejected_count:
+            self._reject(why)
         return self.blocks
 
-    def unusable_in_words(self, effect: str = "") -> tuple[str, ...]:
+    def describe_invalid(self, effect: str = "") -> tuple[str, ...]:
         """Return the warnings about the columns and the rejected rows.
 
         Args:
             effect: what becomes of these rows in numbers of several blocks.
         """
-        reasons = self.refused["reason"].tolist()
+        reasons = self.rejected["reason"].tolist()
         total = self.reasons.size
-        unusable = unusable_in_words(self.refused_count, total, self.row_labels, reasons, effect)
+        unusable = describe_invalid(self.rejected_count, total, self.row_labels, reasons, effect)
         return (*self.remarks, *unusable)
 
-    def with_refused(
+    def with_rejected(
         self, answers: Columns, row: NDArray[np.int_] | None = None
     ) -> dict[str, NDArray[Any]]:
         """Return a table of answers with the rejected rows inserted, in the order of the table.
@@ -141,26 +141,26 @@ class BlockRows:
             answers: columns, a row for each block; NaN of those that cannot be used.
             row: index in the table of the block of each answer; None for all blocks.
         """
-        if not self.refused_count:
+        if not self.rejected_count:
             return dict(answers)
         row = self.blocks["row"] if row is None else row
-        order = np.argsort(np.concatenate([row, self.refused["row"]]), kind="stable")
+        order = np.argsort(np.concatenate([row, self.rejected["row"]]), kind="stable")
         empty = {"f": np.nan, "b": False, "O": ""}
         columns = {}
         for name, column in answers.items():
-            nothing = np.full(self.refused_count, empty[column.dtype.kind], dtype=column.dtype)
-            columns[name] = np.concatenate([column, self.refused.get(name, nothing)])[order]
+            nothing = np.full(self.rejected_count, empty[column.dtype.kind], dtype=column.dtype)
+            columns[name] = np.concatenate([column, self.rejected.get(name, nothing)])[order]
         return columns
 
-    def refused_by_row(self) -> dict[int, dict[str, str]]:
+    def rejected_by_row(self) -> dict[int, dict[str, str]]:
         """Return ``block_id``, ``site_id`` and ``reason`` of the rejected rows, by row."""
-        names = [name for name in ("block_id", "site_id", "reason") if name in self.refused]
-        rows = enumerate(self.refused["row"].tolist())
-        return {row: {name: self.refused[name][i] for name in names} for i, row in rows}
+        names = [name for name in ("block_id", "site_id", "reason") if name in self.rejected]
+        rows = enumerate(self.rejected["row"].tolist())
+        return {row: {name: self.rejected[name][i] for name in names} for i, row in rows}
 
-    def _refuse(self, why: str) -> NoReturn:
-        reasons = self.refused["reason"].tolist()
-        refuse(self.source, self.row_labels, reasons, self.reasons.size, why)
+    def _reject(self, why: str) -> NoReturn:
+        reasons = self.rejected["reason"].tolist()
+        reject(self.source, self.row_labels, reasons, self.reasons.size, why)
 
 
 NO_BLOCK = "{}: there is no block in the file"
@@ -212,7 +212,7 @@ def read_blocks(
     if isinstance(source, BlockRows):
         return source
     if kind is not None:
-        facts_of(kind)  # refuses a kind that there is not
+        facts_of(kind)  # rejects a kind that there is not
     if not hasattr(source, "items"):
         source = as_path(source, "blocks", "a table of blocks")
     for_all = for_all or {}
@@ -245,7 +245,7 @@ def read_blocks(
     kinds = [cell or kind or "" for cell in columns.get("kind", [""] * size)]
     modes = columns["mode"].tolist() if "mode" in columns else None
     with table.named():
-        blocks = many_blocks(values, size, kinds=kinds, modes=modes, rows=True)
+        blocks = classify_blocks(values, size, kinds=kinds, modes=modes, rows=True)
     table.check_read(for_all, blocks.read)
     reasons = block_reasons_of(blocks, size)
     if need_kind:
@@ -268,7 +268,7 @@ def read_blocks(
         for i in np.flatnonzero((reasons == "") & (columns["kind"] != answer_kind)).tolist():
             row_kind = columns["kind"][i]
             reasons[i] = f"the block's kind is {row_kind}, and the answer is for kind {answer_kind}"
-    _refuse_columns(columns, reasons)
+    _reject_columns(columns, reasons)
     for i, fault in faults.items():
         reasons[i] = fault
     used = {*blocks.read, *TEXTS, *PLACE, *PORTFOLIO, *reads, *of_place}
@@ -316,7 +316,7 @@ def _place_on_map(columns: dict[str, NDArray[Any]], crs: str | None, source: str
             ) from None
 
 
-def _refuse_columns(columns: Columns, reasons: NDArray[np.object_]) -> None:
+def _reject_columns(columns: Columns, reasons: NDArray[np.object_]) -> None:
     """Enter the reasons of rows whose position, count, weight or loss is invalid."""
 
     def say(wrong: NDArray[np.bool_], text: str, *names: str) -> None:

@@ -15,10 +15,10 @@ from rbfrag.errors import InputError, checked_name
 from rbfrag.exchange.excel_text import as_written
 from rbfrag.exchange.tables.files import open_table
 from rbfrag.exchange.tables.parts import Parts, TableFile, TablePart, cells_of
-from rbfrag.fragility.lookup import block_of
-from rbfrag.question.blocks import kinds_by_numbers
+from rbfrag.fragility.model_selection import block_of
+from rbfrag.question.classify import kinds_by_numbers
 from rbfrag.question.sections import ANGLES
-from rbfrag.question.shapes import OF_A_SHAPE, PLANE_TEXTS, RECTANGLE, SHAPES
+from rbfrag.question.shape_validation import OF_A_SHAPE, PLANE_TEXTS, RECTANGLE, SHAPES
 from rbfrag.question.table import (
     Column,
     Header,

@@ -10,7 +10,7 @@ import numpy as np
 from rbfrag.exchange.tables.files import write_block_table
 from rbfrag.exchange.tables.workbook import openpyxl
 from rbfrag.files import output_path, written_whole
-from rbfrag.question.shapes import RECTANGLE
+from rbfrag.question.shape_validation import RECTANGLE
 from rbfrag.question.table import header_of
 from rbfrag.vocabulary import quantities
 from rbfrag.vocabulary.quantities import FAILURE, PLANES

@@ -11,18 +11,19 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rbfrag.errors import InputError, UnknownModelError
+from rbfrag.exchange.block_inputs import collect_blocks
 from rbfrag.exchange.block_rows import PLACE, PORTFOLIO, BlockRows, Blocks
-from rbfrag.exchange.given_blocks import given_blocks
+from rbfrag.exchange.nearest_site import WITHIN_KM, join_sites
 from rbfrag.exchange.openquake.events import (
     JobFiles,
     measures_in,
     read_events,
     read_magnitudes,
 )
-from rbfrag.exchange.site_join import WITHIN_KM, join_sites
+from rbfrag.fragility.invalid_rows import FROM_SUMS
 from rbfrag.fragility.model import FragilityModel
-from rbfrag.fragility.unusable import FROM_SUMS
-from rbfrag.hazards.between_measures import (
+from rbfrag.hazards.event_set import EventSet
+from rbfrag.hazards.im_uncertainty import (
     LAW_TAU,
     PGA_ALONE,
     PREFERRED,
@@ -30,7 +31,6 @@ from rbfrag.hazards.between_measures import (
     component_of_velocity,
     velocity_of,
 )
-from rbfrag.hazards.event_set import EventSet
 from rbfrag.hazards.loss_answer import LossAnswer
 from rbfrag.hazards.losses import Run, event_losses
 from rbfrag.hazards.measure_type import requested_measure
@@ -117,7 +117,7 @@ def losses(
         DatabaseError: the database cannot be read.
     """
     inputs, answering, lasted = parts_of((), question, BLOCKS, ANSWERING, _Lasted.__optional_keys__)
-    rows = given_blocks(inputs, blocks, reads=(*PLACE, *PORTFOLIO), one_kind=False)
+    rows = collect_blocks(inputs, blocks, reads=(*PLACE, *PORTFOLIO), one_kind=False)
     job = JobFiles.of(folder, files)
     meaning = component_named("rotd50" if component is None else component)
     events = read_events(job, imts=imt or _best(job), **lasted)
@@ -137,7 +137,7 @@ def losses(
         else meaning.in_words("the measures are")
     )
     texts = (
-        *rows.unusable_in_words(FROM_SUMS),
+        *rows.describe_invalid(FROM_SUMS),
         *_without_loss(rows),
         *events.warnings,
         *doubts_about(events.measures),
@@ -150,7 +150,7 @@ def losses(
     )  # fmt: skip
     if "loss" in rows.blocks:
         answer.block_rates[2, np.isnan(rows.blocks["loss"])] = np.nan
-    return replace(answer, refused=rows.refused_by_row(), tau=tau)
+    return replace(answer, rejected=rows.rejected_by_row(), tau=tau)
 
 
 def _best(job: JobFiles) -> tuple[str, ...]:

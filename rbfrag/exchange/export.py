@@ -12,9 +12,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from rbfrag.errors import InputError
 from rbfrag.exchange.block_fragility import BlockFunctions, block_functions
+from rbfrag.exchange.block_inputs import collect_blocks, read_by_models
 from rbfrag.exchange.block_rows import Blocks
 from rbfrag.exchange.fragility_function import renamed
-from rbfrag.exchange.given_blocks import given_blocks, read_by_models
 from rbfrag.exchange.nrml import nrml_text
 from rbfrag.exchange.pelicun_table import metadata_text, pelicun_text
 from rbfrag.exchange.share_fragility import share_functions
@@ -32,7 +32,7 @@ from rbfrag.solver.kinds import KindSpec, facts_of
 from rbfrag.vocabulary.quantities import ANSWERING, BLOCKS
 
 EACH_NEEDED = "an exposure model needs a function of each"
-"""Why a table with a row that cannot be used is refused."""
+"""Why a table with a row that cannot be used is rejected."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -180,7 +180,7 @@ def pelicun(
     return request.answer(str(target), str(beside), result, renames)
 
 
-_NOT_IN_NRML = "#'\"", "_", "the OpenQuake engine refuses in an ID"
+_NOT_IN_NRML = "#'\"", "_", "the OpenQuake engine rejects in an ID"
 _NOT_IN_TABLES = "-", ".", "the loader splits an ID at"
 """Characters that an ID cannot have, what stands for them, and why."""
 
@@ -221,7 +221,7 @@ class _Request(NamedTuple):
             numbers, question, BLOCKS, ANSWERING, _Functions.__optional_keys__
         )
         blocks, one_class = request.get("blocks"), request.get("one_class", False)
-        rows = given_blocks(inputs, blocks)
+        rows = collect_blocks(inputs, blocks)
         table = rows.require_all(EACH_NEEDED)
         measure, _ = requested_measure(request.get("imt", "PGV"), alone=True)
         kind, read, medians = read_by_models(rows)
@@ -234,7 +234,7 @@ class _Request(NamedTuple):
         shares = request.get("shares")
         return cls(facts_of(kind), read, names, measure, one_class, shares, meaning, how, remarks)
 
-    def functions(self, refused: tuple[str, str, str]) -> tuple[BlockFunctions, list[Diagnostic]]:
+    def functions(self, rejected: tuple[str, str, str]) -> tuple[BlockFunctions, list[Diagnostic]]:
         """Return the functions of the blocks, and the renamed identifiers."""
         if self.shares is None:
             of = self.names, self.numbers, self.measure, self.facts.kind
@@ -248,7 +248,7 @@ class _Request(NamedTuple):
             p2, kr = (self.numbers[name] for name in TOPPLING_BLOCK.names)
             of_all = self.names[0], p2, kr, self.measure, list(self.shares)
             result = share_functions(*of_all, **self.how)
-        functions, renames = renamed(result.functions, *refused)
+        functions, renames = renamed(result.functions, *rejected)
         return result._replace(functions=functions), renames
 
     @property

@@ -168,16 +168,16 @@ def _longest(x: FloatArray, p: FloatArray, error: FloatArray, floor: float) -> N
 
 
 def renamed(
-    functions: Sequence[FragilityFunction], refused: str, by: str, why: str
+    functions: Sequence[FragilityFunction], rejected: str, by: str, why: str
 ) -> tuple[list[FragilityFunction], list[Diagnostic]]:
     """Return the functions with invalid characters of their names replaced, and a warning.
 
     Args:
-        refused: characters that a name cannot have.
+        rejected: characters that a name cannot have.
         by: what stands for each of them.
         why: what is wrong with them.
     """
-    to = str.maketrans(dict.fromkeys(refused, by))
+    to = str.maketrans(dict.fromkeys(rejected, by))
     named = [replace(function, name=function.name.strip().translate(to)) for function in functions]
     before = list(dict.fromkeys(function.name for function in functions))
     changed = [name for name in before if name.strip() != name.strip().translate(to)]

@@ -11,14 +11,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rbfrag.errors import InputError
+from rbfrag.exchange.block_inputs import collect_blocks, read_by_models
 from rbfrag.exchange.block_rows import PLACE, Blocks
-from rbfrag.exchange.given_blocks import given_blocks, read_by_models
 from rbfrag.exchange.shakemap import at_places, has_all_fields, read_shakemap
 from rbfrag.fragility import describe
-from rbfrag.fragility.unusable import FROM_MEAN, FROM_SUMS
+from rbfrag.fragility.invalid_rows import FROM_MEAN, FROM_SUMS
 from rbfrag.hazards.maps.map_failures import MapFailures, SiteLocations, map_failures
 from rbfrag.hazards.maps.site_probability import site_probability
-from rbfrag.question.blocks import numbers_in
+from rbfrag.question.classify import numbers_in
 from rbfrag.question.components import component_named
 from rbfrag.question.fields import AnsweringFields, BlockKeywords, V
 from rbfrag.question.keywords import parts_of
@@ -171,7 +171,7 @@ def shakemap(
         DatabaseError: the database cannot be read.
     """
     inputs, answering = parts_of(numbers, question, BLOCKS, ANSWERING)
-    rows = given_blocks(inputs, blocks, reads=(*PLACE, "weight", "count"))
+    rows = collect_blocks(inputs, blocks, reads=(*PLACE, "weight", "count"))
     meaning = component_named(component)
     shaken = read_shakemap(grid, uncertainty=uncertainty, allow_partial=allow_partial)
     has_coordinates = "lon" in rows.blocks
@@ -198,7 +198,7 @@ def shakemap(
     )
     table = rows.blocks
     warnings = [
-        *rows.unusable_in_words(FROM_SUMS if has_coordinates else FROM_MEAN),
+        *rows.describe_invalid(FROM_SUMS if has_coordinates else FROM_MEAN),
         *shaken.warnings,
     ]
     warnings += doubts_about(measures)
@@ -209,8 +209,8 @@ def shakemap(
     if count is not None and not has_coordinates:  # a mean over all blocks
         weight = count if weight is None else weight * count
     answer = site_probability(
-        measures, component=meaning, weight=None if has_coordinates else weight, own_block=has_coordinates,
-        std_ln=std_ln, kind=kind, **read, **answering,
+        measures, component=meaning, weight=None if has_coordinates else weight,
+        own_block=has_coordinates, std_ln=std_ln, kind=kind, **read, **answering,
     )  # fmt: skip
     shaking, chosen = answer.shaking, answer.shaking.model
     warnings += chosen.notes
@@ -268,7 +268,7 @@ def shakemap(
             columns["count"] = count
         columns["warnings"] = codes_by_row(rows.remarks, rows.reasons.size)[table["row"]]
         columns["reason"] = np.full(lon.size, "", dtype=object)
-        columns = rows.with_refused(columns)
+        columns = rows.with_rejected(columns)
     event = shaken.event
     name = " ".join(part for part in (event.description, event.time[:10]) if part)
     if event.magnitude is not None:

@@ -40,7 +40,7 @@ def block_from_mesh(
     The ground is level. Contacts are the vertices within `contact_mm` of the lowest one; along
     each azimuth the block rocks about the outermost of them on either side. Flipped faces are
     turned and holes of three or four edges closed, with a warning; what else is not one closed
-    surface is refused.
+    surface is rejected.
 
     Args:
         path: file ending in ``.obj``, ``.ply`` or ``.stl``.
@@ -101,7 +101,7 @@ def _closed_surface(source: Path) -> tuple[Trimesh, NDArray[np.float64], list[st
     _without_double_faces(mesh, notes)
     mesh.remove_unreferenced_vertices()
     _close(source, mesh, notes)
-    _refuse_several_bodies(source, mesh)
+    _reject_several_bodies(source, mesh)
     _turn_outwards(source, mesh, notes)
     if not mesh.volume > 1e-9 * float(np.ptp(vertices, axis=0).max()) ** 3:
         raise InputError(
@@ -188,7 +188,7 @@ def _close(source: Path, mesh: Trimesh, notes: list[str]) -> None:
     raise InputError(f"{source}: the mesh is {reason}; an open surface has no volume: {_CLOSE_IT}")
 
 
-def _refuse_several_bodies(source: Path, mesh: Trimesh) -> None:
+def _reject_several_bodies(source: Path, mesh: Trimesh) -> None:
     bodies = int(mesh.body_count)
     if bodies > 1:
         raise InputError(f"{source} has {bodies} separate closed surfaces: keep one")

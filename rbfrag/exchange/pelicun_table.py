@@ -212,7 +212,7 @@ def _extend_to_limits(function: FragilityFunction) -> tuple[list[float], list[fl
         slope = (p[-1] - p[-2]) / (x[-1] - x[-2]) if p.size > 1 else 0.0
         last = (1.0 - p[-1]) / max(slope, 1e-3)
         x, p = np.append(x, x[-1] + min(last, x[-1])), np.append(p, 1.0)
-    # pelicun keeps six digits and refuses neighbours that are then equal
+    # pelicun keeps six digits and rejects neighbours that are then equal
     x, p = _rounded(x), _rounded(p)
     keep = [0]
     for i in range(1, x.size - 1):

@@ -19,7 +19,7 @@ from rbfrag.exchange.block_rows import PLACE, Blocks, read_blocks
 from rbfrag.exchange.tables.files import write_block_table
 from rbfrag.hazards.hazard_answer import HazardAnswer
 from rbfrag.question.sections import in_sections
-from rbfrag.question.shapes import SHAPES
+from rbfrag.question.shape_validation import SHAPES
 from rbfrag.solver.block.arrays import BlockArray
 from rbfrag.solver.results import FloatArray
 from rbfrag.vocabulary.quantities import SPACE

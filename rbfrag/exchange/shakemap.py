@@ -18,7 +18,7 @@ from rbfrag.vocabulary.quantities import MEASURES
 FloatArray = NDArray[np.float64]
 
 MOST_NODES = 20_000_000
-"""Larger grids are refused."""
+"""Larger grids are rejected."""
 
 _G = {"pctg": 0.01, "%g": 0.01, "g": 1.0}
 _V = {"cms": 0.01, "cm/s": 0.01, "m/s": 1.0}

@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 
 from rbfrag.errors import InputError
 from rbfrag.exchange.block_rows import BlockRows
-from rbfrag.exchange.site_join import WITHIN_KM, join_sites
+from rbfrag.exchange.nearest_site import WITHIN_KM, join_sites
 from rbfrag.fragility.method import TOPPLING_BLOCK
 from rbfrag.hazards.curve import HazardCurve
 from rbfrag.hazards.hazard_answer import HazardAnswer
-from rbfrag.question.blocks import numbers_in
+from rbfrag.question.classify import numbers_in
 from rbfrag.results.diagnostic import Diagnostic, codes_by_row
 from rbfrag.solver.kinds import KINDS
 from rbfrag.vocabulary.quantities import column_of
@@ -185,4 +185,4 @@ def rate_columns(
         return result
     nowhere = np.full(rows.reasons.size, "", dtype=object)
     columns_of_rows = {**rows.columns, "site": rows.columns.get("site_id", nowhere)}
-    return replace(rows, columns=columns_of_rows).with_refused(result, columns["row"])
+    return replace(rows, columns=columns_of_rows).with_rejected(result, columns["row"])

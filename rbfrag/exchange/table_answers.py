@@ -20,15 +20,15 @@ from rbfrag.exchange.excel_text import as_text, as_written, changed_texts, formu
 from rbfrag.exchange.tables.files import table_path, table_writer, write_csv_notes
 from rbfrag.exchange.tables.parts import TablePart, Write
 from rbfrag.files import as_path, written_whole
+from rbfrag.fragility.invalid_rows import FIRST, describe_invalid, reject
 from rbfrag.fragility.joint import UNKNOWN, Placement, count_moments, count_quantiles
-from rbfrag.fragility.lookup import find_model
 from rbfrag.fragility.measures import MEASURES
+from rbfrag.fragility.model_selection import find_model
 from rbfrag.fragility.prediction_array import PredictionArray
-from rbfrag.fragility.unusable import FIRST, refuse, unusable_in_words
 from rbfrag.question.components import SINGLE_COMPONENT, component_named
 from rbfrag.question.keywords import LEVEL
 from rbfrag.question.question import OF_BOUND, ask, with_drained_bound
-from rbfrag.question.shapes import PLANE_TEXTS
+from rbfrag.question.shape_validation import PLANE_TEXTS
 from rbfrag.results.diagnostic import Diagnostic, codes_by_row, diagnostics
 from rbfrag.results.numbers import count_of, interval, percent, rounded
 from rbfrag.results.result import Result, TextLine, TextTable
@@ -206,7 +206,7 @@ def predict_table(
     read = (*BLOCK, *SHAKING, *BY_ROW, "count")
     counts = np.zeros(3, dtype=np.int64)
     together: list[tuple[FloatArray, FloatArray, NDArray[np.object_], FloatArray]] = []
-    refused: dict[str, str] = {}
+    rejected: dict[str, str] = {}
     rows: list[dict[str, Any]] = []
     formulas: list[str] = []
     empty: set[str] = set()
@@ -242,17 +242,17 @@ def predict_table(
                 (answer["probability"][finite], predicted.y_m_s[finite], site[finite],
                  count[finite])
             )  # fmt: skip
-            for i in np.flatnonzero(~finite)[: FIRST - len(refused)].tolist():
-                refused[f"{table.file.word} {part.lines[i]}"] = answer["reason"][i]
+            for i in np.flatnonzero(~finite)[: FIRST - len(rejected)].tolist():
+                rejected[f"{table.file.word} {part.lines[i]}"] = answer["reason"][i]
             counts += [finite.size, int(finite.sum()), int(answer["in_domain"].sum())]
         total, answered, inside = counts.tolist()
         if not total:
             raise InputError(NO_BLOCK.format(origin))
         if not answered:
-            refuse(str(origin), [*refused], [*refused.values()], total)
+            reject(str(origin), [*rejected], [*rejected.values()], total)
         table.check_read(inputs, chosen["read"])
         used = {*chosen.pop("read"), *_SHAKING, *texts, *PLACE, *ROW}
-        missing = unusable_in_words(total - answered, total, [*refused], [*refused.values()])
+        missing = describe_invalid(total - answered, total, [*rejected], [*rejected.values()])
         notes += diagnostics(
             remarks,
             by_row,

@@ -1,6 +1,6 @@
 """Safe reading of XML files from other tools.
 
-Document type definitions are refused: entity bombs and references to other files need one, and
+Document type definitions are rejected: entity bombs and references to other files need one, and
 none of the formats here has one.
 """
 
@@ -20,10 +20,10 @@ End = Callable[[str, int], None]
 Text = Callable[[str], None]
 
 MOST_BYTES = 1 << 31
-"""Larger files are refused."""
+"""Larger files are rejected."""
 
 DEEPEST = 100
-"""Documents that are read whole are refused beyond this depth."""
+"""Documents that are read whole are rejected beyond this depth."""
 
 
 def parse_xml(
@@ -42,14 +42,14 @@ def parse_xml(
     def line() -> int:
         return parser.CurrentLineNumber
 
-    def refuse(*_: object) -> None:
+    def reject(*_: object) -> None:
         raise InputError(
             f"{source}, line {line()}: the file has a document type definition, which is not "
             f"supported in {description}"
         )
 
-    parser.StartDoctypeDeclHandler = refuse
-    parser.EntityDeclHandler = refuse
+    parser.StartDoctypeDeclHandler = reject
+    parser.EntityDeclHandler = reject
     parser.StartElementHandler = lambda name, attributes: start(_local(name), attributes, line())
     parser.EndElementHandler = lambda name: end(_local(name), line())
     parser.CharacterDataHandler = text

@@ -13,8 +13,8 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from rbfrag.db.shock_pairs import ShockEnd, StoredShockPair
+from rbfrag.fragility.confidence import ParameterErrors, packed, quantiles_of
 from rbfrag.fragility.fit.clusters import cr3
-from rbfrag.fragility.intervals import ParameterErrors, packed, quantiles_of
 from rbfrag.fragility.method import SINGLE
 from rbfrag.solver.results import Outcome
 

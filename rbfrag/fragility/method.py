@@ -35,7 +35,7 @@ class ArrayNamespace(NamedTuple):
         cos: its cosine.
         ndtri: its inverse.
         step_sums: Σ (x·d)² and Σ (x·d)⁴ over the steps d of parameters that leave earthquakes
-            out, from :class:`rbfrag.fragility.intervals.ParameterErrors` and the slopes x.
+            out, from :class:`rbfrag.fragility.confidence.ParameterErrors` and the slopes x.
     """
 
     log: Callable[[Any], Any]
@@ -217,7 +217,7 @@ class BlockParameters:
         fractions: those of the options that lie between 0 and 1 and whose scatter is one of
             their value; of strength and size it is one of the logarithm.
         adjust: changes the values by what is stated so, before anything reads them.
-        refuses: the combinations of values that no block has.
+        rejects: the combinations of values that no block has.
         safe_steps: how many steps the stored grid goes on for fits above its strongest block, all
             of them safe by mechanics.
         judged_kr: strength up to which fits are judged, where their grid goes on far beyond what
@@ -238,7 +238,7 @@ class BlockParameters:
     stored: Mapping[str, tuple[float, ...]] = field(default_factory=dict, hash=False)
     fractions: tuple[str, ...] = ()
     adjust: Callable[[dict[str, Any], ArrayNamespace], None] | None = None
-    refuses: tuple[MechanicalBound, ...] = ()
+    rejects: tuple[MechanicalBound, ...] = ()
     safe_steps: int = 0
     judged_kr: float = math.inf
     points: Literal["strengths", "scaled_records", "displacements"] = "strengths"

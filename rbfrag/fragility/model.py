@@ -10,9 +10,9 @@ from typing import Any, NamedTuple, cast
 
 from rbfrag.db.model_file import MODEL_FORM, RETIRED, ModelRow
 from rbfrag.errors import InputError, ModelError
+from rbfrag.fragility.confidence import ParameterErrors, Quantiles, packed
 from rbfrag.fragility.dependence import Dependence
 from rbfrag.fragility.domain import RATIOS, Ratio, Spread, ratios_of, stored_spread
-from rbfrag.fragility.intervals import ParameterErrors, Quantiles, packed
 from rbfrag.fragility.measures import ABOUT_SCATTER, CREDIBLE, HIGHEST, LOWEST, TERMS, Term
 from rbfrag.fragility.method import TOPPLING_BLOCK, ArrayNamespace, Form, MechanicalBound, Method
 from rbfrag.fragility.methods import method_named, method_names

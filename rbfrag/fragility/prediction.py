@@ -12,11 +12,11 @@ from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
 from rbfrag.errors import InputError
 from rbfrag.fragility import describe
-from rbfrag.fragility.intervals import Quantiles, checked_level, quantiles_of
-from rbfrag.fragility.lookup import check_numbers
+from rbfrag.fragility.confidence import Quantiles, checked_level, quantiles_of
 from rbfrag.fragility.measures import ABOUT_SCATTER
 from rbfrag.fragility.method import SINGLE
 from rbfrag.fragility.model import AT_REST, NO_EVENT_RANGE, FragilityModel
+from rbfrag.fragility.model_selection import check_numbers
 from rbfrag.results.diagnostic import Diagnostic, diagnostics
 from rbfrag.results.numbers import TINY, confidence, equals, exact_percent, interval, percent
 from rbfrag.results.result import Result, TextLine, TextTable
@@ -25,8 +25,8 @@ from rbfrag.solver.kinds import BY_MECHANICS, by_model, mode_of_kind
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
-    from rbfrag.fragility.checks import Judgement, Remark
     from rbfrag.fragility.prediction_array import PredictionArray
+    from rbfrag.fragility.validation import Judgement, Remark
 
 _SINGLE_TYPES = (float, int, str, bytes)
 MOST_SITES = 10_000
@@ -246,7 +246,7 @@ class MotionPrediction(Prediction):
 A = TypeVar("A", bound="Prediction | PredictionArray")
 
 
-def with_remarks(
+def add_warnings(
     answer: A, remarks: tuple[Diagnostic, ...], last: tuple[Diagnostic, ...] = ()
 ) -> A:
     """Add warnings about blocks (first) and about the shaking (last) to a prediction."""
@@ -317,7 +317,7 @@ def answer_given(
     # Kept apart so that single numbers do not load numpy.
     from rbfrag.fragility.prediction_array import predict_many
 
-    return predict_many(model, inputs, quantiles, interval=interval, refuse_nan=nan == "raise")
+    return predict_many(model, inputs, quantiles, interval=interval, reject_nan=nan == "raise")
 
 
 def _at_sites(
@@ -336,14 +336,14 @@ def _at_sites(
             fields=("sites",),
         )
     if model.dependence is None:
-        return with_remarks(answer, (NO_EVENT_RANGE,))
+        return add_warnings(answer, (NO_EVENT_RANGE,))
     # Kept apart: a single answer loads no library.
     scatters = not ABOUT_SCATTER.isdisjoint(inputs)
     if scatters and isinstance(answer, Prediction) and answer.shaking is None:
         scatters = False
     if scatters:
         if not isinstance(answer, Prediction) or "pgv_tau" not in inputs or weights is not None:
-            return with_remarks(answer, (NOT_SHARED,))
+            return add_warnings(answer, (NOT_SHARED,))
         return _shaken_at_sites(answer, model, int(sites), inputs)
     from rbfrag.fragility.joint import share_range
 
@@ -370,7 +370,7 @@ def _shaken_at_sites(
 
     scatter, rest = Scatter.of(model.term, inputs)
     if scatter is None or model.dependence is None or scatter.names[0] != "pgv_m_s":
-        return with_remarks(answer, (NOT_SHARED,))
+        return add_warnings(answer, (NOT_SHARED,))
     block_model, rest = uncertain_model(model, rest)
     about = {
         "possible": getattr(block_model, "possible", None),
@@ -480,7 +480,7 @@ def is_clear(model: FragilityModel, values: Mapping[str, float]) -> bool:
     for bound in model.form.bounds:
         if bound.holds(values):
             return False
-    for bound in block.refuses:
+    for bound in block.rejects:
         if bound.holds(values):
             return False
     if method.doubts is not None and any(
@@ -494,7 +494,7 @@ def _answer_with_diagnostics(
     model: FragilityModel, inputs: dict[str, float], quantiles: Quantiles
 ) -> tuple[Judgement, list[Diagnostic], str]:
     # Kept apart: most questions need no words.
-    from rbfrag.fragility.checks import answer_with_findings
+    from rbfrag.fragility.validation import answer_with_findings
 
     sentences: list[Diagnostic] = []
     ruled: list[str] = []
@@ -504,7 +504,7 @@ def _answer_with_diagnostics(
             sentences.append(Diagnostic(finding.about(finding.value), finding.code))
             ruled.append(finding.how)
 
-    def refuse(holds: bool, finding: Remark) -> None:
+    def reject(holds: bool, finding: Remark) -> None:
         if holds:
             raise InputError(finding.about(finding.value), fields=(finding.name,))
 
@@ -516,7 +516,7 @@ def _answer_with_diagnostics(
 
     judgement = answer_with_findings(
         model, inputs, tuple(inputs), quantiles, SINGLE,
-        say=say, refuse=refuse, unstable=unstable, nothing=False,
+        say=say, reject=reject, unstable=unstable, nothing=False,
     )  # fmt: skip
     if any(text.code == "unstable_at_rest" for text in sentences):
         certain = judgement.answer._replace(probability=1.0, low=1.0, high=1.0)

@@ -13,12 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbfrag.errors import InputError
-from rbfrag.fragility.checks import NOTABLE_SHARE, Remark, answer_with_findings
-from rbfrag.fragility.intervals import Quantiles
+from rbfrag.fragility.confidence import Quantiles
+from rbfrag.fragility.invalid_rows import describe_invalid
 from rbfrag.fragility.measures import ABOUT_SCATTER
 from rbfrag.fragility.method import ArrayNamespace, arrays
 from rbfrag.fragility.model import AT_REST, Answer, FragilityModel
-from rbfrag.fragility.unusable import unusable_in_words
+from rbfrag.fragility.validation import NOTABLE_SHARE, Remark, answer_with_findings
 from rbfrag.results.diagnostic import Diagnostic, diagnostics, texts_by_row
 from rbfrag.results.numbers import count_of, interval
 from rbfrag.results.result import Result, TextLine
@@ -162,7 +162,7 @@ class PredictionArray(Result):
             return self
         first = int(np.argmax(missing.ravel()))
         reason = self.reasons.text_at(first)
-        warnings = unusable_in_words(count, missing.size, [f"element {first}"], [reason])
+        warnings = describe_invalid(count, missing.size, [f"element {first}"], [reason])
         return replace(self, warnings=(*self.warnings, *warnings))
 
     def sentences(self) -> Iterator[str]:
@@ -224,7 +224,7 @@ def predict_many(
     quantiles: Quantiles,
     *,
     interval: bool,
-    refuse_nan: bool,
+    reject_nan: bool,
 ) -> PredictionArray:
     """Return the predictions for broadcast arrays; see :func:`rbfrag.question.question.predict`.
 
@@ -232,7 +232,7 @@ def predict_many(
         inputs: block and measures of the motion by name, numbers or arrays.
         quantiles: of the confidence level.
         interval: whether an interval is asked for.
-        refuse_nan: raise instead of answering NaN.
+        reject_nan: raise instead of answering NaN.
 
     Raises:
         InputError: arrays that are not numeric or do not broadcast, or, if asked, an
@@ -267,7 +267,7 @@ def predict_many(
         }
         with np.errstate(all="ignore"):
             return indices, *_answer_with_diagnostics(
-                model, chunk_inputs, reach, indices, shape, out, refuse_nan=refuse_nan
+                model, chunk_inputs, reach, indices, shape, out, reject_nan=reject_nan
             )
 
     explained = _in_chunks(explain, flagged.size)
@@ -339,7 +339,7 @@ def _answer_part(
     for name, least, most in model.clear_ranges(values):
         clear &= values[name] >= least
         clear &= values[name] <= most
-    bounds = (*model.bounds(values), *block.refuses)
+    bounds = (*model.bounds(values), *block.rejects)
     flags = [bound.holds(values) for bound in bounds]
     if method.doubts is not None:
         flags += [holds for holds, _, _ in method.doubts(model.parameters, values, ns)]
@@ -365,7 +365,7 @@ def _answer_with_diagnostics(
     shape: tuple[int, ...],
     out: _Columns,
     *,
-    refuse_nan: bool,
+    reject_nan: bool,
 ) -> tuple[Texts, Texts, list[Diagnostic]]:
     """Fill the elements that need explanation; return their reasons, sources and warnings."""
     reasons: list[tuple[str, NDArray[np.bool_]]] = []
@@ -382,8 +382,8 @@ def _answer_with_diagnostics(
         if finding.how:
             ruled.append((finding.how, holds))
 
-    def refuse(holds: NDArray[np.bool_], finding: Remark) -> None:
-        if refuse_nan and holds.any():
+    def reject(holds: NDArray[np.bool_], finding: Remark) -> None:
+        if reject_nan and holds.any():
             first = int(np.flatnonzero(holds)[0])
             where = tuple(int(i) for i in np.unravel_index(indices[first], shape))
             text = f"element {where}: {finding.about(float(finding.value[first]))}"
@@ -403,7 +403,7 @@ def _answer_with_diagnostics(
     needed = [*block.names, *model.term.inputs, *optional]
     judgement = answer_with_findings(
         model, inputs, needed, quantiles, arrays(),
-        say=say, refuse=refuse, unstable=unstable,
+        say=say, reject=reject, unstable=unstable,
         nothing=np.zeros(indices.size, dtype=np.bool_),
     )  # fmt: skip
     for column, answer in _answered(out, judgement.answer):

@@ -10,16 +10,16 @@ from typing import Any, Literal
 from numpy.typing import ArrayLike
 
 from rbfrag.errors import InputError
-from rbfrag.fragility.lookup import find_model, unused_measures
 from rbfrag.fragility.measures import ABOUT_SCATTER
 from rbfrag.fragility.model import Model
+from rbfrag.fragility.model_selection import find_model, unused_measures
 from rbfrag.fragility.prediction import (
     MotionPrediction,
     Prediction,
+    add_warnings,
     answer_given,
     is_single,
     single,
-    with_remarks,
 )
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.readers import MotionLike, as_motion
@@ -98,7 +98,7 @@ def predict_motion(
             )
         answer = answer_given(chosen, motion_inputs, level)
         assert isinstance(answer, Prediction)
-        answers[direction] = with_remarks(answer, unused_measures(chosen, block))
+        answers[direction] = add_warnings(answer, unused_measures(chosen, block))
     if polarity != "both":
         return answers[polarity]
     return _mean(answers["forward"], answers["reverse"])
@@ -144,6 +144,6 @@ def measures_of(motion: GroundMotion) -> dict[str, float]:
 
 def _spectrum_of(motion: GroundMotion, p2: float, polarity: Literal["forward", "reverse"]) -> float:
     """Return the toppling spectrum X(p) [m/s]."""
-    # a p2 that cannot be used is refused by the prediction
+    # a p2 that cannot be used is rejected by the prediction
     drawn = p2 if math.isfinite(p2) and p2 > 0.0 else 1.0
     return float(toppling_spectrum(motion, drawn, polarity))

@@ -16,7 +16,7 @@ from dataclasses import dataclass, field, fields
 from typing import Any, Self
 
 from rbfrag.errors import InputError
-from rbfrag.fragility.intervals import Quantiles
+from rbfrag.fragility.confidence import Quantiles
 from rbfrag.fragility.measures import ABOUT_SCATTER, AMPLIFIED, SCATTERED, Term
 from rbfrag.fragility.method import ArrayNamespace, MechanicalBound
 from rbfrag.fragility.model import Answer, FragilityModel

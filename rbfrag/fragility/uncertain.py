@@ -17,12 +17,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rbfrag.errors import InputError
-from rbfrag.fragility.checks import refusals
-from rbfrag.fragility.intervals import Quantiles
+from rbfrag.fragility.confidence import Quantiles
 from rbfrag.fragility.method import SINGLE, ArrayNamespace, BlockParameters, LinearPredictor, arrays
 from rbfrag.fragility.model import Answer, FragilityModel
 from rbfrag.fragility.shaking import MeanModel
 from rbfrag.fragility.shaking_points import GroundMotionQuadrature
+from rbfrag.fragility.validation import rejections
 from rbfrag.solver.results import FloatArray
 from rbfrag.solver.scatter import fraction, lognormal
 
@@ -337,7 +337,7 @@ def drawn_model(
     if not ((weight >= 0.0) & (weight < math.inf)).all() or not weight.sum() > 0.0:
         raise InputError("the weights of draws must be 0 or more, not all 0")
     values = dict(zip(drawn, columns, strict=True))
-    for finding in refusals(values, tuple(values), block.options):
+    for finding in rejections(values, tuple(values), block.options):
         if np.any(finding.holds):
             first = int(np.flatnonzero(finding.holds)[0])
             raise InputError(f"draw {first + 1}: {finding.about(float(finding.value[first]))}")

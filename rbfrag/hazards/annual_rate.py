@@ -9,7 +9,7 @@ import numpy as np
 
 from rbfrag.errors import InputError
 from rbfrag.hazards.curve import HazardCurve
-from rbfrag.hazards.mass import Grid, under
+from rbfrag.hazards.rate_density import Grid, under
 from rbfrag.solver.results import FloatArray
 
 Fragility = Callable[[FloatArray], FloatArray]

@@ -58,7 +58,7 @@ def branch_curves(
         meaning: which curves are meant.
     """
     curves = as_curves(curve_sources, **meaning)
-    refuse_unlike(curves)
+    reject_unlike(curves)
     return curves, branch_weights(weights, curves)
 
 
@@ -98,7 +98,7 @@ def branch_weights(weights: Weights | None, curves: Sequence[HazardCurve]) -> Fl
     return np.asarray(values / finite.sum())
 
 
-def refuse_unlike(curves: Sequence[HazardCurve]) -> None:
+def reject_unlike(curves: Sequence[HazardCurve]) -> None:
     """Reject an empty list of curves, and curves of several measures or sites."""
     if not curves:
         raise InputError("no hazard curve: give one or more")

@@ -187,7 +187,7 @@ def hazard_curve(
         raise InputError(
             f"{source}: {x.size} levels and {rate.size} rates: give one rate for each level"
         )
-    _refuse_disorder(x, rate, measure, source)
+    _reject_disorder(x, rate, measure, source)
     warnings: list[Diagnostic] = []
     # A rate of exceedance never rises with the level. Levels of infinite rate carry no information,
     # and from the first zero on the curve has ended: its end enters the interval of the rate.
@@ -219,7 +219,7 @@ def hazard_curve(
     return HazardCurve(measure, x, rate, end_level, source=source, warnings=tuple(warnings), **of)
 
 
-def _refuse_disorder(x: FloatArray, rate: FloatArray, measure: str, source: str) -> None:
+def _reject_disorder(x: FloatArray, rate: FloatArray, measure: str, source: str) -> None:
     for i, (level, value) in enumerate(zip(x.tolist(), rate.tolist(), strict=True), start=1):
         if not np.isfinite(level) or level <= 0.0:
             raise InputError(

@@ -14,7 +14,6 @@ import numpy as np
 from rbfrag.errors import InputError
 from rbfrag.files import csv_rows, is_number, json_document, number_at, source_text
 from rbfrag.fragility.measures import ALONE
-from rbfrag.hazards.between_measures import velocity_conversion
 from rbfrag.hazards.curve import (
     ANSWERED,
     CurveKeywords,
@@ -22,6 +21,7 @@ from rbfrag.hazards.curve import (
     hazard_curve,
     rates_from_probabilities,
 )
+from rbfrag.hazards.im_uncertainty import velocity_conversion
 from rbfrag.hazards.measure_type import IntensityType, openquake_type
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.question.components import COMPONENTS
@@ -285,7 +285,7 @@ def openquake_curves(text: str, source: str) -> list[HazardCurve]:
     rows = [cells for _, cells in csv_rows(text, source)]
     head = ",".join(rows[0])
     if len(rows) > 1:
-        _refuse_maps([name.strip() for name in rows[1]], source)
+        _reject_maps([name.strip() for name in rows[1]], source)
     years = number_at(_header_value("investigation_time", head, source), f"{source}, line 1")
     if not years > 0.0:
         raise InputError(f"{source}, line 1: investigation_time = {years:g}: give years above zero")
@@ -340,7 +340,7 @@ def openquake_curves(text: str, source: str) -> list[HazardCurve]:
     return curves
 
 
-def _refuse_maps(names: Sequence[str], source: str) -> None:
+def _reject_maps(names: Sequence[str], source: str) -> None:
     """Reject hazard maps and uniform hazard spectra, which have one level of each measure."""
     if any(_LEVEL.fullmatch(name) for name in names):
         return

@@ -12,10 +12,10 @@ import numpy as np
 
 from rbfrag.errors import InputError
 from rbfrag.files import csv_rows, number_at, source_text
-from rbfrag.hazards.between_measures import component_of_velocity, velocity_of
 from rbfrag.hazards.curve import CurveKeywords, HazardCurve
-from rbfrag.hazards.mass import STEP, Grid, smoothing_of, under
-from rbfrag.hazards.shaking import LevelShaking, component_of
+from rbfrag.hazards.im_uncertainty import component_of_velocity, velocity_of
+from rbfrag.hazards.rate_density import STEP, Grid, smoothing_of, under
+from rbfrag.hazards.shaking import HazardLevel, component_of
 from rbfrag.question.components import SINGLE_COMPONENT, component_named
 from rbfrag.results.diagnostic import Diagnostic
 from rbfrag.results.numbers import annual_rate
@@ -118,7 +118,7 @@ class Disaggregation:
         """Return the curve of single-component PGV that corresponds to a curve of PGA.
 
         The rate λ s_M of each magnitude falls with the PGA; the mass that it loses at a PGA goes to
-        the PGV of the law (:func:`rbfrag.hazards.between_measures.velocity_of`), with its scatter.
+        the PGV of the law (:func:`rbfrag.hazards.im_uncertainty.velocity_of`), with its scatter.
         PGA beyond the last level of its curve counts as that level.
 
         Args:
@@ -147,7 +147,7 @@ class Disaggregation:
                 )
         name = meaning.get("component")
         component = component_of(curve, name) or component_named(SINGLE_COMPONENT)
-        shaking = LevelShaking.about("pgv_m_s", component_of_velocity(component))
+        shaking = HazardLevel.about("pgv_m_s", component_of_velocity(component))
         # The rate of PGA above u from magnitude M is λ(u) s_M(u). What it loses between two nodes
         # is mass at that PGA and M, moved to the PGV that both predict.
         end = curve.levels[-1] if curve.end_level is None else curve.end_level
@@ -161,7 +161,7 @@ class Disaggregation:
         rate = np.maximum.accumulate(mass[::-1].cumsum())[::-1]
         nodes = np.flatnonzero(rate > _RAREST * rate[0])[_EVERY // 2 :: _EVERY]
         texts = [
-            *LevelShaking.of(curve, component=name).warnings,
+            *HazardLevel.of(curve, component=name).warnings,
             Diagnostic(
                 "PGV is predicted from PGA and the magnitudes of its disaggregation; a hazard "
                 "curve of PGV is better",

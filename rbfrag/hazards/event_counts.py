@@ -21,9 +21,9 @@ from rbfrag.fragility.large_counts import LargeCounts, LatentEvent
 from rbfrag.fragility.uncertain import normal_steps
 from rbfrag.hazards.event_means import shifts_on
 from rbfrag.hazards.event_set import EventSet
-from rbfrag.hazards.mass import Grid, smoothing_of
 from rbfrag.hazards.portfolio import Portfolio
-from rbfrag.hazards.shaking import LevelShaking
+from rbfrag.hazards.rate_density import Grid, smoothing_of
+from rbfrag.hazards.shaking import HazardLevel
 from rbfrag.hazards.standing_blocks import COPULA, DEPENDENT, INDEPENDENT
 from rbfrag.solver.results import FloatArray
 
@@ -135,7 +135,7 @@ class PartCounts:
     quantiles: FloatArray
 
 
-class Shaken(NamedTuple):
+class TriggeredBlocks(NamedTuple):
     """Blocks that one event may cause to fail.
 
     Args:
@@ -238,7 +238,7 @@ def _bounds(p: FloatArray, count: IntArray) -> tuple[float, float]:
     return float(p.max(initial=0.0)), float(-np.expm1(none))
 
 
-def _shaken(part: EventYears) -> Iterator[tuple[int, Shaken]]:
+def _shaken(part: EventYears) -> Iterator[tuple[int, TriggeredBlocks]]:
     """Yield each event that may cause a failure, with the blocks concerned."""
     # P of each pair of event and block, averaged over the component's scatter; pairs below NOTHING
     # are dropped.
@@ -250,7 +250,7 @@ def _shaken(part: EventYears) -> Iterator[tuple[int, Shaken]]:
     one_measure = along_axes and len(portfolio.measures) == 1 and most <= _MOST_ON_NODES
     shifts = None
     if one_measure:  # on nodes, a fraction of the work
-        about = LevelShaking.about(portfolio.measures[0], portfolio.component)
+        about = HazardLevel.about(portfolio.measures[0], portfolio.component)
         step, smoothing = smoothing_of(about)
         step = step if smoothing.reach else _SHIFT_STEP
         u = np.log(np.maximum(events.measures[portfolio.measures[0]], _LEAST_SHAKING))
@@ -299,7 +299,9 @@ def _shaken(part: EventYears) -> Iterator[tuple[int, Shaken]]:
         span = slice(first, last)
         yield (
             int(event[first]),
-            Shaken(block[span], row[span], p[span], outside[span], square[span], shift[:, span]),
+            TriggeredBlocks(
+                block[span], row[span], p[span], outside[span], square[span], shift[:, span]
+            ),
         )
 
 
@@ -325,7 +327,10 @@ def _sampler(portfolio: Portfolio, indices: Indices) -> JointSampler | LargeCoun
 
 
 def _sampled(
-    part: EventYears, event: int, shaken: Shaken, sampler: JointSampler | LargeCounts | None
+    part: EventYears,
+    event: int,
+    shaken: TriggeredBlocks,
+    sampler: JointSampler | LargeCounts | None,
 ) -> tuple[FloatArray, FloatArray]:
     """Return failures and losses in the samples of one event, and the fraction with failures.
 
@@ -403,7 +408,7 @@ class _Bounds(NamedTuple):
 
 def _failing(
     portfolio: Portfolio,
-    shaken: Shaken,
+    shaken: TriggeredBlocks,
     sides: FloatArray,
     bounds: _Bounds,
     generator: np.random.Generator,
@@ -464,7 +469,7 @@ def _failing(
 
 
 def _bounds_of_z(
-    part: EventYears, shaken: Shaken, generator: np.random.Generator
+    part: EventYears, shaken: TriggeredBlocks, generator: np.random.Generator
 ) -> Callable[[int], _Bounds]:
     """Return a function that draws the thresholds of Z for the next samples.
 
@@ -538,7 +543,7 @@ def _sum_by_moments(
     return number * mean + scale * (generator.standard_gamma(shape) - shape)
 
 
-def _common(part: EventYears, shaken: Shaken) -> float:
+def _common(part: EventYears, shaken: TriggeredBlocks) -> float:
     """Return the fraction of the variance of failure scores that is due to the component."""
     portfolio, indices = part.portfolio, shaken.block
     if not portfolio.component.sigma > 0.0:
@@ -552,7 +557,11 @@ def _common(part: EventYears, shaken: Shaken) -> float:
 
 
 def _of_many(
-    part: EventYears, shaken: Shaken, sampler: LargeCounts, latent: LatentEvent, shift: FloatArray
+    part: EventYears,
+    shaken: TriggeredBlocks,
+    sampler: LargeCounts,
+    latent: LatentEvent,
+    shift: FloatArray,
 ) -> tuple[FloatArray, float]:
     """Return numbers of failures and losses of many blocks, and the probability of any failure."""
     portfolio, indices = part.portfolio, shaken.block

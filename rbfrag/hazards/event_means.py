@@ -14,12 +14,12 @@ import numpy as np
 from scipy.special import ndtri
 
 from rbfrag.db.model_file import ModelRow
-from rbfrag.fragility.intervals import ParameterErrors
+from rbfrag.fragility.confidence import ParameterErrors
 from rbfrag.hazards.event_set import EventSet, IntArray
-from rbfrag.hazards.kernel import KernelBlocks, half_width, sums_of, table_of
-from rbfrag.hazards.mass import Grid, Indices, Smoothing, cubic_at, event_mass
 from rbfrag.hazards.portfolio import Portfolio
-from rbfrag.hazards.shaking import LevelShaking
+from rbfrag.hazards.rate_density import Grid, Indices, Smoothing, cubic_at, event_mass
+from rbfrag.hazards.rate_integration import KernelBlocks, half_width, sums_of, table_of
+from rbfrag.hazards.shaking import HazardLevel
 from rbfrag.solver.integrator.compiled import kernel
 from rbfrag.solver.results import FloatArray
 
@@ -61,7 +61,7 @@ def event_means(events: EventSet, portfolio: Portfolio, level: float) -> EventMe
     # With one intensity measure P of a block is a function of u = ln im alone. Its table over u is
     # made once per site, and each earthquake only interpolates sums over the blocks.
     (name,) = portfolio.measures
-    shaking = LevelShaking.about(name, portfolio.component)
+    shaking = HazardLevel.about(name, portfolio.component)
     sites, site = np.unique(portfolio.site, return_inverse=True)
     mass, squared, u = event_mass(events, name, sites, shaking)
     order = np.argsort(events.site, kind="stable")
@@ -120,7 +120,7 @@ def axes_of(row: ModelRow) -> FloatArray:
 
 
 def shifts_on(
-    portfolio: Portfolio, indices: Indices, shaking: LevelShaking, grid: Grid, smoothing: Smoothing
+    portfolio: Portfolio, indices: Indices, shaking: HazardLevel, grid: Grid, smoothing: Smoothing
 ) -> FloatArray:
     """Return the changes of Φ⁻¹(P) at b ± one standard deviation along the principal axes.
 
@@ -162,7 +162,7 @@ def _groups(site: Indices, sites: int) -> Iterator[tuple[int, int]]:
 
 
 def _blocks_of(
-    portfolio: Portfolio, rows: Indices, site: Indices, shaking: LevelShaking
+    portfolio: Portfolio, rows: Indices, site: Indices, shaking: HazardLevel
 ) -> Iterator[tuple[Indices, KernelBlocks]]:
     """Yield rows of the portfolio by model, a few at a time."""
     for number, model in enumerate(portfolio.answering):

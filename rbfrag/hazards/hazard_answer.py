@@ -12,10 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbfrag.fragility import describe
-from rbfrag.hazards import between_measures
+from rbfrag.hazards import im_uncertainty
 from rbfrag.hazards.curve import HazardCurve
 from rbfrag.hazards.joint_rate import JointRate
-from rbfrag.hazards.mass import Indices
+from rbfrag.hazards.rate_density import Indices
 from rbfrag.hazards.shaking import NOTABLE
 from rbfrag.results.numbers import (
     NEVER,
@@ -264,7 +264,7 @@ class HazardAnswer(Result):
         """Yield the return period of one block, or the expected failures of several."""
         yield from self._of_one_block() if self._is_single else self._of_all_blocks()
         if self.tau is not None:
-            yield between_measures.in_words(self.tau)
+            yield im_uncertainty.in_words(self.tau)
 
     def _of_one_block(self) -> Iterator[str]:
         rate, bound, low, high, chance = (
@@ -450,7 +450,7 @@ class HazardAnswer(Result):
             "method": self.method,
             "imt": self.curves[0].imt,
             "curve_kind": self.curve_kind,
-            "between_measures": between_measures.as_dict(self.tau),
+            "between_measures": im_uncertainty.as_dict(self.tau),
         }
         if self.branches:
             shared["branches"] = [branch.as_dict() for branch in self.branches]

@@ -16,8 +16,8 @@ from rbfrag.errors import InputError
 from rbfrag.fragility.joint import UNKNOWN, Placement, any_fails
 from rbfrag.hazards.annual_rate import probability_in
 from rbfrag.hazards.joint_thresholds import JointRates, joint_rates
-from rbfrag.hazards.kernel import KernelBlocks, Rates, error_step, probabilities
-from rbfrag.hazards.mass import Indices, SiteMass
+from rbfrag.hazards.rate_density import Indices, SiteMass
+from rbfrag.hazards.rate_integration import KernelBlocks, Rates, error_step, probabilities
 from rbfrag.hazards.standing_blocks import COPULA, DEPENDENT, INDEPENDENT
 from rbfrag.results.diagnostic import Diagnostic
 from rbfrag.solver.results import FloatArray

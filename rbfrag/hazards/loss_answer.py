@@ -11,11 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbfrag.fragility import describe
-from rbfrag.hazards import between_measures
+from rbfrag.hazards import im_uncertainty
 from rbfrag.hazards.event_set import EventSet
 from rbfrag.hazards.joint_rate import NO_LAW
-from rbfrag.hazards.kernel import interval_end
 from rbfrag.hazards.portfolio import Portfolio
+from rbfrag.hazards.rate_integration import interval_end
 from rbfrag.hazards.standing_blocks import DEPENDENT, INDEPENDENT
 from rbfrag.hazards.uncertainty import QUANTILES, SOURCES, Ends, MeanUncertainty, ends_by_name
 from rbfrag.results.numbers import (
@@ -139,8 +139,8 @@ class LossAnswer(Result):
         quantiles: of failures and of the loss of a scenario at 5, 50 and 95 %, by law, shape
             (laws, 2, 3); empty where there are none.
         warnings: what to know about the answer.
-        refused: rows of the table that could not be used, by their index: ``block_id``, ``site_id``
-            and ``reason``.
+        rejected: unusable rows of the table, by their index: ``block_id``, ``site_id`` and
+            ``reason``.
         tau: standard deviation of ln rate between measures, beside all intervals; None where it is
             not known.
     """
@@ -162,7 +162,7 @@ class LossAnswer(Result):
     loss_exceedance: Mapping[str, tuple[Exceedance, ...]]
     quantiles: FloatArray
     warnings: tuple[str, ...]
-    refused: Mapping[int, Mapping[str, str]] = field(default_factory=dict)
+    rejected: Mapping[int, Mapping[str, str]] = field(default_factory=dict)
     tau: float | None = None
 
     def mean(self, values: FloatArray) -> float:
@@ -247,7 +247,7 @@ class LossAnswer(Result):
                 text = text if self.events.is_scenario else annual_rates(*ends)
                 yield f"{source} {text}{' (5th–95th)' if source == 'logic tree' else ''}"
         if self.tau is not None:
-            low, high = between_measures.factors_between(self.tau)
+            low, high = im_uncertainty.factors_between(self.tau)
             yield f"intensity measure × {low:.2f}–{high:.2f}"
 
     def lines(self) -> Iterator[TextLine]:
@@ -323,7 +323,7 @@ class LossAnswer(Result):
                 means |= {given_event: mean, f"{given_event}_error": error}
         if scenario:
             means |= self._quantiles()
-        means["between_measures"] = between_measures.as_dict(self.tau)
+        means["between_measures"] = im_uncertainty.as_dict(self.tau)
         means["uncertainty"] = [
             row for name, mean in self.uncertainty.items() for row in mean.as_dicts(name)
         ]
@@ -404,10 +404,10 @@ class LossAnswer(Result):
             strict=True,
         )  # fmt: skip
         rows: list[dict[str, Any]] = [
-            {**dict.fromkeys(names), **self.refused[i]}
-            if i in self.refused
+            {**dict.fromkeys(names), **self.rejected[i]}
+            if i in self.rejected
             else dict(zip(names, (*next(answered), ""), strict=True))
-            for i in range(len(self.portfolio.block_ids) + len(self.refused))
+            for i in range(len(self.portfolio.block_ids) + len(self.rejected))
         ]
         for row in rows:
             if not self.has_losses:

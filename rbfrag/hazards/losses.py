@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from rbfrag.errors import InputError
 from rbfrag.fragility import describe
-from rbfrag.fragility.intervals import quantiles_of
+from rbfrag.fragility.confidence import quantiles_of
 from rbfrag.hazards.event_counts import (
     PAIRS_AT_ONCE,
     SAMPLES_AT_ONCE,
@@ -25,9 +25,9 @@ from rbfrag.hazards.event_counts import (
 from rbfrag.hazards.event_means import EventMeans, axes_of, event_means
 from rbfrag.hazards.event_set import EventSet
 from rbfrag.hazards.joint_rate import BOUNDS_GIVEN, SEVERAL_MODELS, UNKNOWN_TO_MODEL
-from rbfrag.hazards.kernel import interval_end
 from rbfrag.hazards.loss_answer import Exceedance, LossAnswer
 from rbfrag.hazards.portfolio import Portfolio
+from rbfrag.hazards.rate_integration import interval_end
 from rbfrag.hazards.shaking import NOTABLE
 from rbfrag.hazards.uncertainty import (
     QUANTILES,

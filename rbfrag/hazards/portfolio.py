@@ -17,7 +17,7 @@ from rbfrag.fragility.joint import UNKNOWN, Placement
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.fragility.prediction import array_answer
 from rbfrag.fragility.uncertain import normal_product, scatter_steps
-from rbfrag.question.blocks import numbers_in
+from rbfrag.question.classify import numbers_in
 from rbfrag.question.components import Component
 from rbfrag.results.diagnostic import Diagnostic
 from rbfrag.solver.results import FloatArray

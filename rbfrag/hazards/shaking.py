@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from rbfrag.errors import InputError
 from rbfrag.fragility.uncertain import scatter_steps
-from rbfrag.hazards.between_measures import CONVERSIONS, velocity_conversion
 from rbfrag.hazards.curve import ANSWERED, CurveKeywords, HazardCurve
+from rbfrag.hazards.im_uncertainty import CONVERSIONS, velocity_conversion
 from rbfrag.question.components import SINGLE_COMPONENT, Component, component_named
 from rbfrag.results.diagnostic import Diagnostic
 from rbfrag.results.numbers import annual_rate, percent
@@ -28,7 +28,7 @@ NOTABLE = 0.01
 
 
 @dataclass(frozen=True, eq=False)
-class LevelShaking:
+class HazardLevel:
     """Levels of a curve as a measure of a model: level · shift, with weights.
 
     Args:
@@ -48,7 +48,7 @@ class LevelShaking:
     magnitudes_from_g: float | None = None
 
     @classmethod
-    def of(cls, curve: HazardCurve, **meaning: Unpack[CurveKeywords]) -> LevelShaking:
+    def of(cls, curve: HazardCurve, **meaning: Unpack[CurveKeywords]) -> HazardLevel:
         """Return the interpretation of a curve's levels; arguments as for :func:`rbfrag.hazard`."""
         if curve.magnitudes_from_g is not None:
             single = cls.about(
@@ -77,7 +77,7 @@ class LevelShaking:
         spread: float = 0.0,
         warnings: tuple[str, ...] = (),
         ratio: float | None = None,
-    ) -> LevelShaking:
+    ) -> HazardLevel:
         """Return the interpretation of a measure of a given component.
 
         Args:
@@ -160,7 +160,7 @@ def _no_model(curve: HazardCurve) -> str:
     return f"{curve.source}: no model reads {curve.imt} alone: {advice}"
 
 
-def ends_in_words(
+def describe_ends(
     curves: Sequence[HazardCurve],
     site: NDArray[np.intp],
     rate: FloatArray,

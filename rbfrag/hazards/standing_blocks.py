@@ -13,15 +13,17 @@ import numpy as np
 
 from rbfrag.errors import InputError
 from rbfrag.fragility.dependence import Dependence
+from rbfrag.fragility.invalid_rows import reject_elements
 from rbfrag.fragility.joint import UNKNOWN, Placement, any_fails
 from rbfrag.fragility.joint_sampling import JointSampler
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.fragility.uncertain import normal_product, normal_steps
-from rbfrag.fragility.unusable import refuse_elements
 from rbfrag.hazards.annual_rate import Fragility, failure_rate
 from rbfrag.hazards.curve import HazardCurve
+from rbfrag.hazards.group_by_model import parts_by_model
 from rbfrag.hazards.joint_thresholds import joint_rates
-from rbfrag.hazards.kernel import (
+from rbfrag.hazards.rate_density import SiteMass, curve_mass
+from rbfrag.hazards.rate_integration import (
     KernelBlocks,
     Rates,
     error_step,
@@ -29,9 +31,7 @@ from rbfrag.hazards.kernel import (
     probabilities,
     rates,
 )
-from rbfrag.hazards.mass import SiteMass, curve_mass
-from rbfrag.hazards.model_parts import parts_by_model
-from rbfrag.hazards.shaking import LevelShaking, ends_in_words
+from rbfrag.hazards.shaking import HazardLevel, describe_ends
 from rbfrag.question.fields import AnsweringFields
 from rbfrag.question.keywords import LEVEL
 from rbfrag.results.diagnostic import Diagnostic
@@ -40,7 +40,7 @@ from rbfrag.solver.scatter import fraction, lognormal
 from rbfrag.vocabulary.quantities import BLOCK, NUMBERS
 
 ALL_STAND = "that all of them stand is the question"
-"""Why blocks of which one cannot be used are refused."""
+"""Why blocks of which one cannot be used are rejected."""
 
 _SIGMA_POINTS, _SIGMA_REACH = 15, 5.0
 _ALWAYS = 2
@@ -111,7 +111,7 @@ class FragilityBlocks:
         """Return the annual rate of any failure under a curve."""
         result = failure_rate(curve, lambda x: _by_law(np.atleast_2d(self.fragility(x))))
         ends = result.annual_rate, result.above, result.above_at_most, result.below
-        texts = ends_in_words([curve], _FIRST_SITE, *(values[:1] for values in ends))
+        texts = describe_ends([curve], _FIRST_SITE, *(values[:1] for values in ends))
         rates = result.annual_rate[:, None, None]
         beyond = float((result.above_at_most - result.above)[0])
         return AnyRate(rates, float(rates[0, 0, 0]), 0.0, beyond, tuple(texts))
@@ -132,7 +132,7 @@ class ModelBlocks:
     numbers: Mapping[str, FloatArray]
     weight: FloatArray
     medians: Mapping[str, FloatArray]
-    shaking: LevelShaking
+    shaking: HazardLevel
     model: FragilityModel
     level: float
     remarks: tuple[str, ...] = ()
@@ -141,7 +141,7 @@ class ModelBlocks:
     def of(
         cls,
         inputs: Mapping[str, Any],
-        shaking: LevelShaking,
+        shaking: HazardLevel,
         *,
         draws: int,
         seed: int,
@@ -159,7 +159,7 @@ class ModelBlocks:
         # All blocks that survive together must be of one model: their parameters are shared by all
         # earthquakes of their age.
         parts, remarks, reason = parts_by_model(fields, shaking, answering)
-        refuse_elements(reason, ALL_STAND, BLOCK)
+        reject_elements(reason, ALL_STAND, BLOCK)
         if len(parts) > 1:
             kinds = " and ".join(part.model.row.kind for part in parts)
             raise InputError(
@@ -226,7 +226,7 @@ class ModelBlocks:
         beyond = float(curve.annual_rate[-1])
         most = beyond * (np.ones(m) if curve.end_level is None else end)
         sites = np.zeros(m, dtype=np.intp)
-        warnings = ends_in_words([curve], sites, rate, beyond * last, most, first)
+        warnings = describe_ends([curve], sites, rate, beyond * last, most, first)
         if m == 1:
             ends = (interval_end(draw_rates.rate, draw_rates.half, side) for side in (-1.0, 1.0))
             by_law = np.stack([draw_rates.rate, *ends], axis=1)[None]

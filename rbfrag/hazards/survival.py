@@ -16,10 +16,9 @@ from rbfrag.hazards.annual_rate import Fragility
 from rbfrag.hazards.branches import Weights, branch_curves, curve_name, quantile_warning
 from rbfrag.hazards.curve import CurveKeywords, HazardCurve
 from rbfrag.hazards.curve_file import CurveLike
+from rbfrag.hazards.group_by_model import RateKeywords
 from rbfrag.hazards.hazard_answer import NOTABLE_FACTOR
-from rbfrag.hazards.model_parts import RateKeywords
-from rbfrag.hazards.shaking import NOTABLE, LevelShaking
-from rbfrag.hazards.standing import Age, Standing, weights_given_standing
+from rbfrag.hazards.shaking import NOTABLE, HazardLevel
 from rbfrag.hazards.standing_blocks import (
     DEPENDENT,
     INDEPENDENT,
@@ -28,6 +27,7 @@ from rbfrag.hazards.standing_blocks import (
     ModelBlocks,
     StandingBlocks,
 )
+from rbfrag.hazards.survival_probability import Age, Standing, weights_given_standing
 from rbfrag.question.keywords import LEVEL, parts_of
 from rbfrag.results.diagnostic import Diagnostic
 from rbfrag.results.numbers import (
@@ -288,7 +288,7 @@ def survival(
             branches.
         numbers: p2 [1/s²] and kr of the blocks, medians, if they are not given by name.
         age_years: how long the blocks have stood in this position [a], the mean of a lognormal
-            law (:class:`rbfrag.hazards.standing.Age`).
+            law (:class:`rbfrag.hazards.survival_probability.Age`).
         age_sd_years: its standard deviation [a].
         weights: as in :func:`rbfrag.hazard`.
         fragility: instead of blocks, a function from levels of the curves' measure, shape (n,), to
@@ -317,7 +317,7 @@ def survival(
     blocks: StandingBlocks
     if fragility is None:
         require_kind(inputs)
-        shaking = LevelShaking.of(site_curves[0], **meaning)
+        shaking = HazardLevel.of(site_curves[0], **meaning)
         model_blocks = blocks = ModelBlocks.of(
             inputs, shaking, draws=draws, seed=seed, answering=answering
         )

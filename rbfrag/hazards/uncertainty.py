@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 from scipy.stats import chi2
 
-from rbfrag.fragility.intervals import quantiles_of
+from rbfrag.fragility.confidence import quantiles_of
 from rbfrag.hazards.branches import mixture_quantiles, weighted_quantiles
 from rbfrag.hazards.event_set import EventSet
-from rbfrag.hazards.kernel import interval_end
+from rbfrag.hazards.rate_integration import interval_end
 from rbfrag.solver.results import FloatArray
 
 Ends = tuple[float, float]

@@ -89,14 +89,14 @@ def read_motions(
         path: a file in any of the formats of :data:`READERS`; a member of a zip, as
             ``records.zip/chan001.v2``; or a zip, for the traces of all its records.
         units: unit of acceleration, for text files that do not state it: ``g``, ``m/s2``,
-            ``cm/s2`` or ``mm/s2``. Refused where the file has another, unless the file
+            ``cm/s2`` or ``mm/s2``. Rejected where the file has another, unless the file
             contradicts itself and agrees with this.
         dt_s: sampling interval [s], for text files that hold accelerations only; likewise.
         allow_partial: True to read a file whose header states another number of samples than
             follow, or that is cut off. Its motions have `is_partial` and a remark; a last line
             that is cut short is left out.
         gain: counts/(m/s²) of a file in counts (miniSEED), of all its traces or of each by its
-            trace index. Refused for other files.
+            trace index. Rejected for other files.
 
     Raises:
         MotionFileError: the file cannot be read; the message names the line.
@@ -265,7 +265,7 @@ def read_motion(
     name = os.fspath(text)
     index: int | None = None
     stem, mark, tail = name.rpartition("#")
-    # int() refuses thousands of digits, and exists() names that are too long
+    # int() rejects thousands of digits, and exists() names that are too long
     if mark and tail.isascii() and tail.isdigit() and len(tail) < 10 and not _is_file(name):
         name, index = stem, int(tail)
     if is_archive(file := Path(name)):

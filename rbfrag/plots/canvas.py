@@ -1,6 +1,6 @@
 """Figure creation and saving, axis numbers, point clouds, and colours of modes.
 
-Every figure refuses a path that cannot be written before it draws (InputError), and says which
+Every figure rejects a path that cannot be written before it draws (InputError), and says which
 extra brings matplotlib where it is missing (MissingExtraError).
 """
 

@@ -12,9 +12,9 @@ from rbfrag.db.engine import opened_database
 from rbfrag.db.models import load_model
 from rbfrag.db.queries import combination_table
 from rbfrag.errors import InputError
-from rbfrag.fragility.lookup import find_model, stored_row
 from rbfrag.fragility.measures import MEASURES, spectral
 from rbfrag.fragility.model import FragilityModel
+from rbfrag.fragility.model_selection import find_model, stored_row
 from rbfrag.motions.polarity import Polarity
 from rbfrag.motions.readers import MotionLike, as_motion
 from rbfrag.plots.canvas import Out, Picture, plot_path

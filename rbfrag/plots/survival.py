@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from rbfrag.hazards.curve import HazardCurve
 from rbfrag.hazards.curve_file import CurveLike, as_curves
-from rbfrag.hazards.standing import Standing
 from rbfrag.hazards.survival import BranchSurvival, SurvivalAnswer
+from rbfrag.hazards.survival_probability import Standing
 from rbfrag.plots import canvas
 from rbfrag.plots.hazard import measure_title
 from rbfrag.plots.labels import as_written, write_near

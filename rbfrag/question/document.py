@@ -7,9 +7,9 @@ from os import PathLike
 from typing import TYPE_CHECKING, Any
 
 from rbfrag.errors import InputError
-from rbfrag.fragility.lookup import find_model, suited_models, unused_measures
 from rbfrag.fragility.measures import AMPLIFIED
-from rbfrag.fragility.prediction import Prediction, answer_given, with_remarks, with_values
+from rbfrag.fragility.model_selection import find_model, suited_models, unused_measures
+from rbfrag.fragility.prediction import Prediction, add_warnings, answer_given, with_values
 from rbfrag.question.components import SINGLE_ASSUMED, to_single_component
 from rbfrag.question.question import (
     OF_SHAKING,
@@ -67,7 +67,7 @@ def _answer_described(inputs: Mapping[str, Any], *, kind: str | None, **how: Any
     shaking = measures | ({} if motion is None else {"xp_m_s": 0.0, "pga_g": 0.0})
     names = ("kind", "model", "level", "db", "mechanism", "gmm", "rotation_deg", "sites")
     options = {name: how[name] for name in names if how.get(name) is not None}
-    answer = with_remarks(ask_at_rest(shaking, blocks, **options), blocks.remarks)
+    answer = add_warnings(ask_at_rest(shaking, blocks, **options), blocks.remarks)
     return _with_alternatives(answer, [answer], measures, how.get("sites"))
 
 

@@ -6,7 +6,7 @@ from collections.abc import Collection, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from rbfrag.errors import InputError
-from rbfrag.fragility.lookup import find_model
+from rbfrag.fragility.model_selection import find_model
 from rbfrag.question.question import by_field_name
 
 if TYPE_CHECKING:

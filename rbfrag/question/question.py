@@ -11,20 +11,20 @@ from textwrap import wrap
 from typing import TYPE_CHECKING, Any, Literal, Unpack, overload
 
 from rbfrag.errors import InputError, UnknownFieldError
-from rbfrag.fragility.lookup import find_model, unused_measures
 from rbfrag.fragility.measures import MEASURES, spectral
 from rbfrag.fragility.model import AT_REST
+from rbfrag.fragility.model_selection import find_model, unused_measures
 from rbfrag.fragility.prediction import (
     A,
     Prediction,
+    add_warnings,
     answer_given,
     is_single,
-    with_remarks,
     with_values,
 )
-from rbfrag.question.blocks import Blocks, has_shape, one_block, read_by_some
+from rbfrag.question.classify import Blocks, classify_block, has_shape, read_by_some
 from rbfrag.question.components import SINGLE_ASSUMED, SINGLE_COMPONENT
-from rbfrag.question.shapes import size_questions
+from rbfrag.question.shape_validation import size_questions
 from rbfrag.results.diagnostic import Diagnostic
 from rbfrag.solver.kinds import BY_MECHANICS, FREE_STANDING, facts_of
 from rbfrag.vocabulary.quantities import (
@@ -163,7 +163,7 @@ def with_drained_bound(
     try:
         bound = answer(dry)
     except InputError as error:
-        return with_remarks(result, (), (no_drained_bound(error),))
+        return add_warnings(result, (), (no_drained_bound(error),))
     if isinstance(bound, Prediction):
         (group,) = described(dry, kind).groups
         return with_values(result, drained=_bound_values(bound, group.numbers))
@@ -175,7 +175,7 @@ def with_drained_bound(
     lost = np.flatnonzero(answered & np.isnan(bound.probability))
     if lost.size:
         note = no_drained_bound(bound.reason.ravel()[lost[0]]).replaced(rows=lost)
-        result = with_remarks(result, (), (note,))
+        result = add_warnings(result, (), (note,))
     return with_values(result, drained=drained)
 
 
@@ -220,7 +220,7 @@ def _bound_values(bound: Prediction, numbers: Mapping[str, Any]) -> dict[str, fl
     return {n: getattr(bound, n) for n in OF_BOUND} | {name: numbers.get(name)}
 
 
-def _keywords_in_words() -> str:
+def _describe_keywords() -> str:
     """Return the list of keywords for the documentation."""
     lines = []
     for name in QUESTION:
@@ -233,7 +233,7 @@ def _keywords_in_words() -> str:
 
 
 if predict.__doc__:  # python -OO leaves none
-    predict.__doc__ = predict.__doc__.replace("    KEYWORDS", _keywords_in_words())
+    predict.__doc__ = predict.__doc__.replace("    KEYWORDS", _describe_keywords())
 
 
 def by_field_name(question: Mapping[str, Any], fields: Collection[str]) -> dict[str, Any]:
@@ -292,7 +292,7 @@ def described(inputs: Mapping[str, Any], kind: str | None) -> Blocks:
     A block that fails at rest has no numbers; ``at_rest`` has the reason.
     """
     block = {n: value for n, value in inputs.items() if n not in OF_SHAKING}
-    return one_block(block, kind, inputs.get("pga_g"), at_rest=True)
+    return classify_block(block, kind, inputs.get("pga_g"), at_rest=True)
 
 
 def ask_at_rest(
@@ -353,11 +353,11 @@ def _answer_motion(
     group = blocks.groups[0]
     if blocks.at_rest:
         of_record = {"xp_m_s": 0.0, "pga_g": 0.0}
-        return with_remarks(ask_at_rest(of_record, blocks, **options), blocks.remarks)
+        return add_warnings(ask_at_rest(of_record, blocks, **options), blocks.remarks)
     answer = predict_motion(
         {**group.numbers, **measures}, motion, kind=group.kind, polarity=polarity, **options
     )
-    return with_remarks(answer, blocks.remarks)
+    return add_warnings(answer, blocks.remarks)
 
 
 def ask(
@@ -416,7 +416,7 @@ def ask(
             level=level, db=db, nan=nan, interval=interval, weights=weights, component=component,
             rows=rows,
         )  # fmt: skip
-        return with_remarks(answer, remarks)
+        return add_warnings(answer, remarks)
     how: dict[str, Any] = {"nan": nan, "interval": interval, "weights": weights, "sites": sites}
     if (kind is None or isinstance(kind, str)) and mode is None and not rows:
         if not has_shape(inputs):
@@ -425,7 +425,7 @@ def ask(
             answer = answer_given(chosen, inputs, level, **how)
             size = size_questions(inputs.get("p2"), getattr(answer.probability, "shape", ()))
             remarks = (*unread, *size, *unused_measures(chosen, inputs))
-            return with_remarks(answer, remarks, _assumed(component, answer))
+            return add_warnings(answer, remarks, _assumed(component, answer))
         if all(name in _SINGLE or is_single(value) for name, value in inputs.items()):
             blocks = described(inputs, kind)
             (group,) = blocks.groups
@@ -434,22 +434,22 @@ def ask(
                 at_rest = ask_at_rest(
                     values, blocks, model=model, level=level, db=db, rotation_deg=rotation_deg
                 )
-                return with_remarks(at_rest, blocks.remarks)
+                return add_warnings(at_rest, blocks.remarks)
             chosen = find_model(model, values, db, kind=group.kind, rotation_deg=rotation_deg)
             answer = answer_given(chosen, values, level, **how)
             assert isinstance(answer, Prediction)
             remarks = (*blocks.remarks, *unused_measures(chosen, values))
-            return with_remarks(answer, remarks, _assumed(component, answer))
+            return add_warnings(answer, remarks, _assumed(component, answer))
     if "block" in inputs:
         raise InputError("block must be a single block: give several blocks as arrays of fields")
     # Kept apart so that a single block does not load numpy.
-    from rbfrag.question.answers import ask_many
+    from rbfrag.question.predict_arrays import ask_many
 
     answer = ask_many(
         inputs, kind, mode, rows=rows, level=level, **how,
         find=lambda values, of: find_model(model, values, db, kind=of, rotation_deg=rotation_deg),
     )  # fmt: skip
-    return with_remarks(answer, (), _assumed(component, answer))
+    return add_warnings(answer, (), _assumed(component, answer))
 
 
 def _assumed(component: Any, answer: Prediction | PredictionArray) -> tuple[Diagnostic, ...]:

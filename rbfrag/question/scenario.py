@@ -15,10 +15,10 @@ from typing import Any, NamedTuple
 
 from rbfrag.errors import InputError
 from rbfrag.fragility import describe
-from rbfrag.fragility.lookup import stored_row
 from rbfrag.fragility.measures import AMPLIFIED, SCATTERED, TERMS
 from rbfrag.fragility.method import SINGLE, ArrayNamespace, arrays
 from rbfrag.fragility.model import FragilityModel, Model
+from rbfrag.fragility.model_selection import stored_row
 from rbfrag.fragility.prediction import is_single, single
 from rbfrag.question.bssa14 import MEASURES, MECHANISMS, Ordinate, bssa14
 from rbfrag.question.components import COMPONENT_SIGMA, to_single_component, total_sigma

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from rbfrag.errors import InputError
-from rbfrag.question.shapes import SHAPES, WAYS
+from rbfrag.question.shape_validation import SHAPES, WAYS
 from rbfrag.results.diagnostic import Diagnostic, diagnostics
 from rbfrag.solver.block.planes import plane_of, section_of
 from rbfrag.vocabulary.quantities import SPACE

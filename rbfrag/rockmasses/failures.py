@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rbfrag.fragility.intervals import checked_level
+from rbfrag.fragility.confidence import checked_level
 from rbfrag.results.diagnostic import Diagnostic
 from rbfrag.rockmasses.report import block_columns
 from rbfrag.rockmasses.shaking import AT_REST, OPEN, OUTCOMES, ShakenMass

@@ -24,7 +24,7 @@ from rbfrag.solver.stability.joint import (
     ROCK_KG_M3,
     UNDRAINED,
     is_drained,
-    refuse_half,
+    reject_half,
 )
 from rbfrag.solver.stability.modes import MODES, STATES, ModeName, StateName
 from rbfrag.solver.stability.residual_strength import ENDED
@@ -181,7 +181,7 @@ class RockMass:
         if drainage is not None and _WATER not in variables:
             raise InputError(f"{DRAINAGE} requires {_WATER}")
         drains = is_drained(drainage)
-        refuse_half(*(variables.get(key) for key in _ROUGHNESS))
+        reject_half(*(variables.get(key) for key in _ROUGHNESS))
         back_fracture = description.get("block.back_fracture", True)
         if not isinstance(back_fracture, bool):
             raise InputError(f"block.back_fracture = {back_fracture!r}: use true or false")
@@ -400,7 +400,7 @@ class Realisations:
         """Reason why each realisation is invalid, as text; empty for a block."""
         return np.array(IMPOSSIBLE, dtype=object)[self.reason_code]
 
-    def refuse_vertical(self) -> None:
+    def reject_vertical(self) -> None:
         """Reject a rock mass with a vertical acceleration, which is part of the motion."""
         if np.any(self.kv != 0.0):
             raise InputError(

@@ -12,15 +12,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbfrag.errors import InputError
-from rbfrag.fragility.checks import refusals
-from rbfrag.fragility.intervals import checked_level
-from rbfrag.fragility.lookup import find_model
+from rbfrag.fragility.confidence import checked_level
 from rbfrag.fragility.model import Model
+from rbfrag.fragility.model_selection import find_model
 from rbfrag.fragility.prediction import answer_given
 from rbfrag.fragility.prediction_array import PredictionArray
-from rbfrag.question.many import push_of_blocks
+from rbfrag.fragility.validation import rejections
+from rbfrag.question.classify_arrays import push_of_blocks
 from rbfrag.question.question import predict
-from rbfrag.question.shapes import ModeShapes, dip_of_factor, p2_at_rest
+from rbfrag.question.shape_validation import ModeShapes, dip_of_factor, p2_at_rest
 from rbfrag.results.diagnostic import Diagnostic
 from rbfrag.results.numbers import percent
 from rbfrag.rockmasses.joint_sets import Realisations
@@ -178,13 +178,13 @@ def scenario(
         DatabaseError: the database cannot be read.
     """
     measures = {name: float(value) for name, value in measures.items()}
-    for refusal in refusals(measures, measures):
-        if refusal.holds:
-            raise InputError(refusal.about(refusal.value), fields=(refusal.name,))
+    for rejection in rejections(measures, measures):
+        if rejection.holds:
+            raise InputError(rejection.about(rejection.value), fields=(rejection.name,))
     if not measures:
         raise InputError("a scenario requires an intensity measure, such as pgv_m_s")
     checked_level(level)
-    realisations.refuse_vertical()
+    realisations.reject_vertical()
     stability = realisations.stability
     unstable = realisations.is_block & (stability.state_code == UNSTABLE)
     after = realisations.in_time

@@ -369,7 +369,7 @@ def plan_shaking(
         InputError: a scale that is not above zero, none at all or too many for the realisations,
             components that do not go together, or a rock mass that states a vertical acceleration.
     """
-    realisations.refuse_vertical()
+    realisations.reject_vertical()
     wrong = [scale for scale in scales if not (math.isfinite(scale) and scale > 0.0)]
     if wrong or not len(scales):
         complaint = f"scale {wrong[0]:g}" if wrong else "no scale"

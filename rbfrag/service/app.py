@@ -15,8 +15,8 @@ from fastapi.staticfiles import StaticFiles
 from starlette.exceptions import HTTPException
 
 from rbfrag.errors import RbfragError
-from rbfrag.fragility.lookup import stored_rows
 from rbfrag.fragility.model_list import ModelList
+from rbfrag.fragility.model_selection import stored_rows
 from rbfrag.service import block, predict, uploads, vocabulary, work
 from rbfrag.service.documents import Health, ModelListed
 from rbfrag.service.guard import Guard

@@ -32,7 +32,7 @@ def add_routes(routes: APIRouter) -> None:
 
         A block is described by height and width, by alpha1, alpha3 and r3, or by s1, s2 and gamma.
         """
-        from rbfrag.question.blocks import on_planes
+        from rbfrag.question.classify import on_planes
         from rbfrag.solver.stability.single import stability
 
         shape = on_planes(query.inputs())
@@ -75,7 +75,7 @@ def _drawn(
     inputs: Mapping[str, Any],
 ) -> tuple[Block, Stability, str, Mapping[str, float] | None, str]:
     """Return a block, its stability, its kind of failure, and the inputs of a prediction."""
-    from rbfrag.question.blocks import one_block, shape_of
+    from rbfrag.question.classify import classify_block, shape_of
     from rbfrag.solver.kinds import facts_of, kind_of_mode
     from rbfrag.solver.stability.single import level_rectangle, stability
 
@@ -99,7 +99,7 @@ def _drawn(
     kind = kind_of(result)
     slides = {"displacement_m": 1.0} if "ky" in facts_of(kind).parameters else {}
     try:
-        (group,) = one_block({**inputs, **slides}, kind).groups
+        (group,) = classify_block({**inputs, **slides}, kind).groups
     except InputError as error:  # no earthquake decides about it, or no model answers
         return shape.block, result, kind, None, "" if result.state == "unstable" else str(error)
     read = {name: value for name, value in group.numbers.items() if name not in slides}
@@ -108,7 +108,7 @@ def _drawn(
 
 def require(numbers: Collection[str], *names: str) -> None:
     """Reject a block with a missing number."""
-    from rbfrag.question.shapes import OF_A_SHAPE, WAYS
+    from rbfrag.question.shape_validation import OF_A_SHAPE, WAYS
 
     for name in names:
         if name not in numbers:

@@ -62,18 +62,18 @@ class Guard:
                 size += len(message.get("body", b""))
             await send(message)
 
-        refusal = self._refusal(scope)
+        rejection = self._rejection(scope)
         try:
-            if refusal is None:
+            if rejection is None:
                 await self._app(as_get, receive, watched)
             else:
-                await refusal(scope, receive, watched)
+                await rejection(scope, receive, watched)
         finally:
             elapsed_s = perf_counter() - start
             self._metrics.count(scope, status, elapsed_s)
             log_request(scope, status, size, elapsed_s)
 
-    def _refusal(self, scope: Message) -> Any:
+    def _rejection(self, scope: Message) -> Any:
         headers = dict(scope["headers"])
         # those that came in one piece, which the connection has read before it could count them
         if sum(len(name) + len(value) + 4 for name, value in scope["headers"]) > HEADERS_BYTES:

@@ -13,7 +13,7 @@ from fastapi import APIRouter, Query, Request
 
 from rbfrag.errors import InputError
 from rbfrag.exchange.tables.csv_file import NOTE, dialect_of
-from rbfrag.fragility.lookup import models_in_memory
+from rbfrag.fragility.model_selection import models_in_memory
 from rbfrag.fragility.prediction_array import PredictionArray
 from rbfrag.question.document import answer_block
 from rbfrag.question.question import ask, with_drained_bound

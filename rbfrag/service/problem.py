@@ -170,7 +170,7 @@ _short = Repr()
 _short.maxstring = _short.maxother = 60
 
 
-def refusal(fields: Mapping[str, FieldInfo], errors: Sequence[Mapping[str, Any]]) -> InputError:
+def rejection(fields: Mapping[str, FieldInfo], errors: Sequence[Mapping[str, Any]]) -> InputError:
     """Return the error for values that do not match a model.
 
     Args:

@@ -18,7 +18,7 @@ LAST_WORDS_S = 0.5
 """How long [s] an idle connection is still read when the service ends."""
 
 LINGER_S = 5.0
-"""How long [s] a client whose body was refused may go on sending before the connection ends."""
+"""How long [s] a client whose body was rejected may go on sending before the connection ends."""
 
 LINGER_BYTES = 1 << 26
 """How much it may send; a 64th of it where it does not say how much it will."""
@@ -65,7 +65,7 @@ class BoundedProtocol(HttpToolsProtocol):
         if self._late is not None:
             self._read += len(data)
             if self._read > HEADERS_BYTES:
-                self._refuse(_TOO_LARGE)
+                self._reject(_TOO_LARGE)
 
     def on_message_begin(self) -> None:
         """Start the timeout of the headers of a request."""
@@ -86,7 +86,7 @@ class BoundedProtocol(HttpToolsProtocol):
         """End the response, and discard what the client still sends for a while.
 
         A connection that is closed upon unread bytes is reset, and the client may never read why
-        it was refused (RFC 9112, section 9.6).
+        it was rejected (RFC 9112, section 9.6).
         """
         has_length = any(name == b"content-length" for name, _ in self.scope["headers"])
         self._unread = LINGER_BYTES if has_length else LINGER_BYTES // 64
@@ -113,7 +113,7 @@ class BoundedProtocol(HttpToolsProtocol):
         if too_many > 0:
             idle = (connection for connection in self._open if connection._idle())
             for connection in list(islice(idle, too_many)):
-                connection._refuse(_TOO_SLOW)
+                connection._reject(_TOO_SLOW)
                 self._open.pop(connection, None)
 
     def _idle(self) -> bool:
@@ -125,14 +125,14 @@ class BoundedProtocol(HttpToolsProtocol):
 
     def _wait_for_headers(self) -> None:
         self._read = 0
-        self._late = self.loop.call_later(HEADERS_S, self._refuse, _TOO_SLOW)
+        self._late = self.loop.call_later(HEADERS_S, self._reject, _TOO_SLOW)
 
     def _stop_waiting(self) -> None:
         if self._late is not None:
             self._late.cancel()
             self._late = None
 
-    def _refuse(self, answer: bytes) -> Any:
+    def _reject(self, answer: bytes) -> Any:
         self._stop_waiting()
         if not self.transport.is_closing():
             self.transport.write(answer)

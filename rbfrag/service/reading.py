@@ -23,7 +23,7 @@ from rbfrag.service.problem import (
     GONE,
     MalformedError,
     RequestRefusedError,
-    refusal,
+    rejection,
 )
 from rbfrag.service.settings import ServiceSettings
 from rbfrag.solver.kinds import FREE_STANDING
@@ -234,7 +234,7 @@ def read_as(model: type[T], values: Any) -> T:
     try:
         return model.model_validate(values)
     except ValidationError as error:
-        raise refusal(model.model_fields, error.errors()) from None
+        raise rejection(model.model_fields, error.errors()) from None
 
 
 class QueryRoute(APIRoute):

@@ -58,13 +58,13 @@ class ServiceSettings:
                 fields=("host", "token_file"),
             )
         if self.workers < 1:
-            raise _refused("workers", self.workers, "it must be 1 or more")
+            raise _rejected("workers", self.workers, "it must be 1 or more")
         if not 0 <= self.port <= 65535:
-            raise _refused("port", self.port, "give a number from 0 to 65535")
+            raise _rejected("port", self.port, "give a number from 0 to 65535")
         for name in ("body_limit_mb", "body_time", "row_limit", "time_limit", "jobs"):
             value = getattr(self, name)
             if not 0.0 < value < float("inf"):
-                raise _refused(name, f"{value:g}", "give a number above zero")
+                raise _rejected(name, f"{value:g}", "give a number above zero")
         hosts = tuple(self.allow_host)
         if token is None:
             # else a web page could ask by a name of its own that leads to this computer
@@ -72,7 +72,7 @@ class ServiceSettings:
         return replace(self, token=token, allow_host=hosts, early=True)
 
 
-def _refused(field: str, value: object, why: str) -> InputError:
+def _rejected(field: str, value: object, why: str) -> InputError:
     return InputError(f"{field} {value}: {why}", fields=(field,))
 
 
@@ -102,7 +102,7 @@ def read_token(file: str | None) -> str | None:
                 token = stream.read(_LONGEST_TOKEN_FILE).strip()
         except (OSError, ValueError) as error:
             reason = error.strerror if isinstance(error, OSError) else "it is not ASCII text"
-            raise _refused("token_file", file, f"cannot be read: {reason}") from None
+            raise _rejected("token_file", file, f"cannot be read: {reason}") from None
     if not _TOKEN.fullmatch(token):
         raise InputError(
             f"the token in {source} must have 16 to 512 letters, digits or characters ._~+/=-: "

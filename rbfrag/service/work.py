@@ -109,13 +109,13 @@ def spectrum(body: bytes, query: SpectrumQuery) -> bytes:
 def critical(body: bytes, query: CriticalQuery) -> bytes:
     """Return the same JSON as `rbfrag critical`."""
     from rbfrag.fragility.method import TOPPLING_BLOCK
-    from rbfrag.question.blocks import has_shape, one_block
+    from rbfrag.question.classify import classify_block, has_shape
     from rbfrag.solver.respond import respond
     from rbfrag.solver.search.critical import critical as search
 
     numbers = query.inputs()
     if has_shape(numbers):
-        (group,) = one_block(numbers, TOPPLING_BLOCK.kind).groups
+        (group,) = classify_block(numbers, TOPPLING_BLOCK.kind).groups
         numbers = {**group.numbers}
     require(numbers, "p2")
     ground, kr = _motion(body, query), numbers.get("kr")
@@ -131,9 +131,9 @@ def hazard(body: bytes, query: HazardQuery, db: str | None) -> bytes:
     """Return the same JSON as `rbfrag hazard`."""
     import numpy as np
 
-    from rbfrag.hazards.answer import hazard_at_sites, with_drained_rates
-    from rbfrag.hazards.between_measures import velocity_conversion
     from rbfrag.hazards.curve_file import hazard_curves_in, suited_curves
+    from rbfrag.hazards.hazard_rates import hazard_at_sites, with_drained_rates
+    from rbfrag.hazards.im_uncertainty import velocity_conversion
 
     try:
         curves = hazard_curves_in(_text(body), FILE, imt=query.imt, site=query.site)

@@ -13,7 +13,7 @@ from rbfrag.solver.critical_result import CriticalResult
 from rbfrag.solver.kind import Kind
 from rbfrag.solver.models import model_of_kind, model_of_mode
 from rbfrag.solver.results import SEARCH_LIMIT, Polarity
-from rbfrag.solver.stability.single import Stability, refuse_undecided, rough_deg, stability
+from rbfrag.solver.stability.single import Stability, require_stable, rough_deg, stability
 
 
 def critical(
@@ -45,7 +45,7 @@ def critical(
     further than `displacement_m`. Slumping and confined toppling: the smallest factor on the record
     that brings `block` down, and the k/PGA that it means; nothing is proven of the factors between
     those that were looked at. The options of all kinds stand in one signature, each under its name
-    in the contract; a kind refuses those of another.
+    in the contract; a kind rejects those of another.
 
     Args:
         motion: horizontal ground motion, or its file.
@@ -145,5 +145,5 @@ def judged_at_rest(options: Mapping[str, Any]) -> Stability:
         drainage=options.get("drainage"),
         density_kg_m3=options.get("density_kg_m3"),
     )
-    refuse_undecided(judged)
+    require_stable(judged)
     return judged

@@ -192,7 +192,7 @@ def excitation(
     if vertical is None:
         w = np.ones_like(k_h)
     else:
-        _refuse_different_sampling(motion, vertical)
+        _reject_different_sampling(motion, vertical)
         k_v = vertical.acceleration_g
         if k_v.size != k_h.size:
             longer = motion if k_h.size > k_v.size else vertical
@@ -239,7 +239,7 @@ def _twice(values: FloatArray, n: int) -> FloatArray:
     return np.concatenate([values[:n], values[n - 1 :]])
 
 
-def _refuse_different_sampling(motion: GroundMotion, vertical: GroundMotion) -> None:
+def _reject_different_sampling(motion: GroundMotion, vertical: GroundMotion) -> None:
     if motion.node_time_s is None and vertical.node_time_s is None:
         if motion.dt_s != vertical.dt_s:
             raise InputError(

@@ -173,7 +173,7 @@ class Kind(KindSpec):
         why = f": {self.no_search}" if self.no_search else ""
         raise InputError(f"no critical values of kind {self.kind} are computed{why}")
 
-    def refuse_foreign(self, options: Iterable[str], allowed: Sequence[str]) -> None:
+    def reject_foreign(self, options: Iterable[str], allowed: Sequence[str]) -> None:
         """Reject an option that the kind does not support."""
         foreign = sorted(set(options) - set(allowed))
         if foreign:

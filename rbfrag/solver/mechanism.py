@@ -16,7 +16,7 @@ from rbfrag.solver.kind import Kind, RunEnd, Runner, Shaking, SupportedBlock
 from rbfrag.solver.results import Response
 from rbfrag.solver.simulation import Simulation, end_of, response_of, simulate_block
 from rbfrag.solver.stability.modes import words_of_mode
-from rbfrag.solver.stability.single import refuse_undecided, stability
+from rbfrag.solver.stability.single import require_stable, stability
 
 
 def driven_up_below(supported_block: SupportedBlock) -> float:
@@ -135,7 +135,7 @@ def shaken_mechanism(
     judged = stability(
         block, beta_deg=beta_deg, phi_deg=phi_deg, phi_back_deg=phi_back_deg, **water
     )
-    refuse_undecided(judged)
+    require_stable(judged)
     if judged.mode != model.mode:
         raise InputError(
             f"the block is not of kind {model.kind}: its mode is {words_of_mode(judged.mode)} "

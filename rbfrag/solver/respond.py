@@ -20,8 +20,8 @@ from rbfrag.solver.results import BlockState, Polarity, Response
 from rbfrag.solver.sequence import STARTS_ANEW, Motions, respond_in_sequence
 from rbfrag.solver.stability.joint import IS_DRAINED, STAYS_UNDRAINED
 from rbfrag.solver.stability.modes import ModeName, words_of_mode
-from rbfrag.solver.stability.residual_strength import JOINT, after_first_slip, refuse_before_slip
-from rbfrag.solver.stability.single import Stability, refuse_undecided, stability
+from rbfrag.solver.stability.residual_strength import JOINT, after_first_slip, reject_before_slip
+from rbfrag.solver.stability.single import Stability, require_stable, stability
 
 
 def respond(
@@ -53,7 +53,7 @@ def respond(
     The block is given in one of three ways: `p2` and `kr` (it topples, or rocks on level ground if
     `kind` says so), `ky` (it slides), or `block` with `beta_deg` and `phi_deg`, whose failure mode
     chooses the model. It has more than ten parameters, because scripts name each quantity that a
-    user states; a kind refuses those of another.
+    user states; a kind rejects those of another.
 
     Args:
         motion: horizontal ground motion, or its file; or a list of them: of slides and slumps each
@@ -139,7 +139,7 @@ def respond(
             "cohesion_pa": cohesion_pa,
         }
         planes, after = after_first_slip(block, planes)
-        refuse_before_slip(block, planes, kind)
+        reject_before_slip(block, planes, kind)
         judged = stability(block, **planes)
         if kind is None:
             model = model_of_mode(judged.mode, back_fracture=back_fracture)
@@ -264,7 +264,7 @@ def _site(
 ) -> SupportedBlock:
     """Return the supported block in the form that its model uses."""
     if not model.free_standing:
-        refuse_undecided(judged)
+        require_stable(judged)
     return SupportedBlock.of(block, judged, model.mode, settings)
 
 

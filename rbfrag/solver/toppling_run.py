@@ -56,7 +56,7 @@ def respond(
     p2 = positive(p2, "p2", "1/s²")
     kr = positive(kr, "kr", "g")
     excited = excitation(motion, vertical, polarity)
-    refuse_endless(excited, p2)
+    reject_endless(excited, p2)
     run = simulate(excited, p2=p2, kr=kr)
     outcome = outcome_of(run)
     theta_c = math.atan(kr)
@@ -101,7 +101,7 @@ def runner(excited: Excitation, *, p2: float) -> Callable[[float], Run]:
     return run
 
 
-def refuse_endless(excited: Excitation, p2: float) -> None:
+def reject_endless(excited: Excitation, p2: float) -> None:
     """Reject a block so small that one run would not end in reasonable time."""
     steps = math.sqrt(p2) * float(excited.time_s[-1] - excited.time_s[0]) / PH_MAX
     if steps > MOST_STEPS:

@@ -171,7 +171,7 @@ def test_cases_are_drawn_alike_and_lift_off(records: Records) -> None:
     assert all(c.excitation.max_q > c.kr for c in first)
 
 
-def test_records_are_found_or_refused(
+def test_records_are_found_or_rejected(
     folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (folder / "notes.txt").write_text("no accelerogram\n")

@@ -233,7 +233,7 @@ def test_pulses_have_their_amplitude_and_length(name: str) -> None:
     assert motion.duration_s == pytest.approx(0.8 if name.endswith("cycle") else 0.4)
 
 
-def test_too_few_earthquakes_are_refused() -> None:
+def test_too_few_earthquakes_are_rejected() -> None:
     data = table()
     few = replace(data, event_id=np.where(data.motion_id % 2 == 0, "a", "b").astype(object))
     with pytest.raises(FitError, match="2 earthquakes"):

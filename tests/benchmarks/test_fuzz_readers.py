@@ -70,10 +70,10 @@ def test_a_silent_change_is_seen(
         found = (change(name, content, path, Random(seed), None, None) for seed in range(60))
         return Counter(became for became, kind, _ in found if kind != "other")
 
-    assert became()["refused"] > 5
+    assert became()["rejected"] > 5
     assert not became()["silent"]
-    monkeypatch.setattr(header_check, "DURATION_REFUSED", float("inf"))
+    monkeypatch.setattr(header_check, "DURATION_REJECTED", float("inf"))
     monkeypatch.setattr(header_check, "DURATION_NOTED", float("inf"))
-    monkeypatch.setattr(header_check, "PEAK_REFUSED", float("inf"))
+    monkeypatch.setattr(header_check, "PEAK_REJECTED", float("inf"))
     monkeypatch.setattr(header_check, "PEAK_NOTED", float("inf"))
     assert became()["silent"] > 0

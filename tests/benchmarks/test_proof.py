@@ -114,7 +114,7 @@ def test_a_plateau_at_the_threshold_is_rest_and_an_ulp_above_is_motion() -> None
     assert (below.outcome, below.decided_by) == (STABLE, "last impact")
 
 
-def test_a_ball_that_holds_both_sides_is_refused() -> None:
+def test_a_ball_that_holds_both_sides_is_rejected() -> None:
     # after the record upright to within the ball: no verdict
     excited = excitation(PULSE)
     with ctx.workprec(100):
@@ -136,7 +136,7 @@ def test_least_later_q_is_below_every_later_q() -> None:
         assert exact(least[node]) < min(later, 0) or (least[node] == 0.0 and later >= 0)
 
 
-def test_outside_the_model_is_refused() -> None:
+def test_outside_the_model_is_rejected() -> None:
     excited = excitation(PULSE, GroundMotion.from_nodes([0.0, 0.2, 0.4], [0.0, -1.5, 0.0]))
     with pytest.raises(ValueError, match="1 \\+ k_v"):
         enclose(excited, p2=3.0, kr=0.1)

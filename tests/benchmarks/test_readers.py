@@ -1,4 +1,4 @@
-"""The list of readers is complete; each reads its sound files and refuses what broke it once."""
+"""The list of readers is complete; each reads its sound files and rejects what broke it once."""
 
 from __future__ import annotations
 
@@ -150,9 +150,9 @@ def test_what_once_ended_in_a_traceback_is_one_sentence(case: str, tmp_path: Pat
     name, content = SPOILT[case]
     path = tmp_path / f"spoilt{BY_NAME[name].suffix}"
     path.write_bytes(content)
-    with pytest.raises(InputError) as refused:
+    with pytest.raises(InputError) as rejected:
         BY_NAME[name].read(path)
-    message = str(refused.value)
+    message = str(rejected.value)
     assert tmp_path.name in message
     assert message.isprintable()
     assert len(message) <= MOST_CHARACTERS

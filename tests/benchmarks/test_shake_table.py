@@ -90,10 +90,10 @@ def test_tables_come_out_and_outcomes_are_kept(
         assert "nan" not in line
     assert "(missed)" in first.out
 
-    def refuse(_: FloatArray) -> None:
+    def reject(_: FloatArray) -> None:
         raise AssertionError("outcomes are simulated again")
 
-    monkeypatch.setattr(simulated, "run_blocks", refuse)
+    monkeypatch.setattr(simulated, "run_blocks", reject)
     with pytest.raises(SystemExit):
         main(request)
     assert capsys.readouterr().out == first.out

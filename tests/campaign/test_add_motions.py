@@ -319,7 +319,7 @@ def test_a_longer_or_shorter_vertical_is_used_and_said(tmp_path: Path, db: Path)
         assert "rest" in pair.remark
 
 
-def test_mixed_dt_is_refused_and_said(tmp_path: Path, db: Path) -> None:
+def test_mixed_dt_is_rejected_and_said(tmp_path: Path, db: Path) -> None:
     pair, report = one_pair(at2_recording(tmp_path, dt_s=0.01), db)
     assert pair.vertical_id is None
     assert "dt = 0.01 s, the horizontal 0.02 s" in pair.reason

@@ -102,7 +102,7 @@ class TestVertical:
         assert row == (None, False)
         _sound(database)
 
-    def test_none_at_all_is_refused(self, three_component_database: Path) -> None:
+    def test_none_at_all_is_rejected(self, three_component_database: Path) -> None:
         database = three_component_database
         with opened_database(database) as engine, engine.begin() as connection:
             connection.execute(update(schema.motion).values(is_vertical=False))
@@ -123,7 +123,9 @@ class TestGrid:
         ("grid", "message"),
         [(1, "2 to"), ([0.5, 0.5], "twice"), ([-1.0], "above zero"), ([float("nan")], "finite")],
     )
-    def test_what_is_refused(self, three_component_database: Path, grid: Any, message: str) -> None:
+    def test_what_is_rejected(
+        self, three_component_database: Path, grid: Any, message: str
+    ) -> None:
         with pytest.raises(InputError, match=message):
             simulate(three_component_database, p2=P2, grid=grid)
 

@@ -280,7 +280,9 @@ def test_what_two_databases_found_is_merged_and_exported(
         ({"rotations_deg": (2.0,)}, "rotations_deg requires kind slumping"),
     ],
 )
-def test_what_cannot_be_run_is_refused(database: Path, options: dict[str, Any], words: str) -> None:
+def test_what_cannot_be_run_is_rejected(
+    database: Path, options: dict[str, Any], words: str
+) -> None:
     with pytest.raises(InputError, match=words):
         simulate(database, **options)
 

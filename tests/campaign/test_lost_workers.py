@@ -13,10 +13,10 @@ import pytest
 
 from rbfrag.cli.commands.simulate import WorkerOptions
 from rbfrag.exchange.event_losses import losses
-from rbfrag.hazards.answer import hazard
 from rbfrag.hazards.curve import HazardCurve
 from rbfrag.hazards.event_counts import count_years
-from rbfrag.hazards.kernel import rate_part
+from rbfrag.hazards.hazard_rates import hazard
+from rbfrag.hazards.rate_integration import rate_part
 
 distributed = pytest.importorskip("distributed")
 
@@ -69,7 +69,7 @@ def test_losses_are_those_of_one_process(
 
 
 def test_rates_are_those_of_one_process(deadly: Deadly, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("rbfrag.hazards.kernel._BLOCKS_OF_A_PART", 16)
+    monkeypatch.setattr("rbfrag.hazards.rate_integration._BLOCKS_OF_A_PART", 16)
     levels = np.geomspace(0.02, 3.0, 20)
     curve = HazardCurve("pgv_m_s", levels, 0.001 * levels**-2.0)
     blocks = np.geomspace(1.0, 30.0, 400), np.linspace(0.05, 0.5, 400)

@@ -142,10 +142,10 @@ def test_what_cannot_be_computed_is_no_part_of_the_sample(database: Path) -> Non
 
 
 def test_what_fails_is_a_finding(database: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def refuse(*arguments: Any, **options: Any) -> None:
+    def reject(*arguments: Any, **options: Any) -> None:
         raise RbfragError("no")
 
-    monkeypatch.setattr(rbfrag.campaign.resimulate, "load_motion", refuse)
+    monkeypatch.setattr(rbfrag.campaign.resimulate, "load_motion", reject)
     findings = _again(database, sample=1).findings
     assert [finding.problem for finding in findings] == ["cannot be computed again: no"]
 

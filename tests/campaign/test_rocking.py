@@ -144,7 +144,7 @@ def test_an_interrupted_campaign_goes_on_where_it_stopped(
         ({"grid": 5}, "grid requires kind toppling"),
     ],
 )
-def test_what_cannot_be_run_is_refused(database: Path, asked: dict[str, Any], words: str) -> None:
+def test_what_cannot_be_run_is_rejected(database: Path, asked: dict[str, Any], words: str) -> None:
     with pytest.raises(InputError, match=words):
         run(database, **asked)
     with pytest.raises(InputError, match="restitution_factors requires kind rocking"):

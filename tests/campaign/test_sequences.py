@@ -216,13 +216,13 @@ def test_damage_is_found(database: Path, values: dict[str, str], problem: str) -
         ({"draws": 0}, "draws must be at least 1, not 0"),
     ],
 )
-def test_what_does_not_go_with_a_sequence_is_refused(
+def test_what_does_not_go_with_a_sequence_is_rejected(
     database: Path, options: dict[str, Any], message: str
 ) -> None:
-    with pytest.raises(InputError) as refused:
+    with pytest.raises(InputError) as rejected:
         simulate(database, **{"kind": "sliding", "sequence": True, **options})
-    assert message in str(refused.value)
-    assert len(str(refused.value)) < 500
+    assert message in str(rejected.value)
+    assert len(str(rejected.value)) < 500
 
 
 def test_one_earthquake_makes_no_pair(tmp_path: Path) -> None:

@@ -41,7 +41,7 @@ def test_two_workers_find_what_one_finds() -> None:
     assert told[0].seconds_left is None
 
 
-def test_no_worker_is_refused() -> None:
+def test_no_worker_is_rejected() -> None:
     made = read_rock_mass(EXAMPLE).realise(10, 1)
     with pytest.raises(InputError, match="jobs"):
         shake(made, record(), jobs=0)

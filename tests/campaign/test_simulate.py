@@ -130,7 +130,7 @@ def test_what_a_stored_combination_lacks_is_added(database: Path) -> None:
     assert _digest(without) == _digest(at_once)
 
 
-def test_a_search_that_contradicts_what_is_stored_is_refused(database: Path) -> None:
+def test_a_search_that_contradicts_what_is_stored_is_rejected(database: Path) -> None:
     simulate(database, p2=P2, jobs=1)
     column = combination.c.kr_over_pga
     with opened_database(database) as engine, engine.begin() as connection:

@@ -48,12 +48,12 @@ def record(tmp_path: Path) -> Path:
     return write_at2(tmp_path / "record.AT2", shaking(3))
 
 
-Refuses = Callable[..., str]
+Rejects = Callable[..., str]
 
 
 @pytest.fixture
-def refuses(shell: Shell) -> Refuses:
-    """Run a command that must be refused with status 2, and return its one message."""
+def rejects(shell: Shell) -> Rejects:
+    """Run a command that must be rejected with status 2, and return its one message."""
 
     def run(*arguments: str | Path, status: int = 2) -> str:
         result = shell(*arguments, expect=status)

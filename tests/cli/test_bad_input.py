@@ -7,45 +7,45 @@ from pathlib import Path
 
 import pytest
 
-from tests.cli.conftest import Refuses, Shell
+from tests.cli.conftest import Rejects, Shell
 from tests.synthetic import shaking, write_at2, write_suite
 
 
 @pytest.mark.parametrize("value", ["0", "-1", "nan", "inf"])
 @pytest.mark.parametrize("option", ["--p2", "--kr"])
-def test_block_values(refuses: Refuses, record: Path, option: str, value: str) -> None:
+def test_block_values(rejects: Rejects, record: Path, option: str, value: str) -> None:
     values = {"--p2": "3", "--kr": "0.1", option: value}
-    message = refuses("respond", record, *(part for pair in values.items() for part in pair))
+    message = rejects("respond", record, *(part for pair in values.items() for part in pair))
     assert option.removeprefix("--") in message
     assert value.lstrip("-") in message
 
 
 @pytest.mark.parametrize("value", ["0", "-1", "nan"])
-def test_critical_values(refuses: Refuses, record: Path, value: str) -> None:
-    assert f"p2 = {value} is not " in refuses("critical", record, "--p2", value)
+def test_critical_values(rejects: Rejects, record: Path, value: str) -> None:
+    assert f"p2 = {value} is not " in rejects("critical", record, "--p2", value)
 
 
-def test_missing_file(refuses: Refuses) -> None:
-    message = refuses("respond", "nowhere.AT2", "--p2", "3", "--kr", "0.1")
+def test_missing_file(rejects: Rejects) -> None:
+    message = rejects("respond", "nowhere.AT2", "--p2", "3", "--kr", "0.1")
     assert "nowhere.AT2" in message
     assert "no such file" in message
 
 
-def test_bad_sample_is_named_with_its_line(refuses: Refuses, record: Path) -> None:
+def test_bad_sample_is_named_with_its_line(rejects: Rejects, record: Path) -> None:
     lines = record.read_text().split("\n")
     lines[10] = lines[10].replace(lines[10].split()[2], "NaN", 1)
     record.write_text("\n".join(lines))
-    message = refuses("critical", record, "--p2", "3")
+    message = rejects("critical", record, "--p2", "3")
     assert "line 11" in message
     assert "NaN" in message
 
 
-def test_wrong_kind_of_record(refuses: Refuses, record: Path) -> None:
+def test_wrong_kind_of_record(rejects: Rejects, record: Path) -> None:
     record.write_text(record.read_text().replace("ACCELERATION TIME", "VELOCITY TIME"))
-    assert "velocity" in refuses("motions", "show", record)
+    assert "velocity" in rejects("motions", "show", record)
 
 
-def test_no_database(refuses: Refuses, tmp_path: Path) -> None:
+def test_no_database(rejects: Rejects, tmp_path: Path) -> None:
     for command in (
         ("motions", "list"),
         ("simulate",),
@@ -54,18 +54,18 @@ def test_no_database(refuses: Refuses, tmp_path: Path) -> None:
         ("db", "check"),
         ("db", "upgrade"),
     ):
-        assert "rbfrag.db" in refuses(*command)
+        assert "rbfrag.db" in rejects(*command)
     # without a name the built-in data answer these
     for asked in (
         ("predict", "--p2", "3", "--kr", "0.1", "--pgv", "0.6"),
         ("fit", "--term", "pgv"),
     ):
-        assert "none.db" in refuses(*asked, "--db", "none.db")
+        assert "none.db" in rejects(*asked, "--db", "none.db")
     assert not list(tmp_path.glob("*.db"))
 
 
-def test_counts_by_something_else(refuses: Refuses) -> None:
-    assert "'kind'" in refuses("db", "info", "--by", "kind")
+def test_counts_by_something_else(rejects: Rejects) -> None:
+    assert "'kind'" in rejects("db", "info", "--by", "kind")
 
 
 def test_without_a_database_the_reference_answers_and_says_so(shell: Shell) -> None:
@@ -77,26 +77,26 @@ def test_without_a_database_the_reference_answers_and_says_so(shell: Shell) -> N
     assert (found["term"], more["term"]) == ("pgv_kr", "pgv_pga")
 
 
-def test_file_that_is_no_database(refuses: Refuses, tmp_path: Path) -> None:
+def test_file_that_is_no_database(rejects: Rejects, tmp_path: Path) -> None:
     place = tmp_path / "notes.db"
     place.write_text("this is a text file of some length, not a database at all\n" * 20)
     for command in (("motions", "list"), ("predict", "--p2", "3", "--kr", "0.1", "--pgv", "0.6")):
-        assert "notes.db" in refuses(*command, "--db", place)
+        assert "notes.db" in rejects(*command, "--db", place)
     assert place.read_text().startswith("this is a text file")
 
 
-def test_database_of_another_program(refuses: Refuses, tmp_path: Path) -> None:
+def test_database_of_another_program(rejects: Rejects, tmp_path: Path) -> None:
     place = tmp_path / "other.db"
     with sqlite3.connect(place) as connection:
         connection.execute("CREATE TABLE t (x)")
     connection.close()
     for command in (("db", "info"), ("predict", "--p2", "3", "--kr", "0.1", "--pgv", "0.6")):
-        assert "other.db" in refuses(*command, "--db", place)
+        assert "other.db" in rejects(*command, "--db", place)
 
 
 @pytest.mark.parametrize("revision", ["0000", "9999"])
 def test_older_or_newer_schema(
-    shell: Shell, refuses: Refuses, record: Path, tmp_path: Path, revision: str
+    shell: Shell, rejects: Rejects, record: Path, tmp_path: Path, revision: str
 ) -> None:
     shell("motions", "add", record)
     connection = sqlite3.connect(tmp_path / "rbfrag.db")
@@ -104,7 +104,7 @@ def test_older_or_newer_schema(
     connection.commit()
     connection.close()
     for command in (("motions", "list"), ("predict", "--p2", "3", "--kr", "0.1", "--pgv", "0.6")):
-        message = refuses(*command)
+        message = rejects(*command)
         assert "rbfrag.db" in message
 
 
@@ -121,36 +121,36 @@ def test_older_or_newer_schema(
     ],
 )
 def test_predict(
-    shell: Shell, refuses: Refuses, tmp_path: Path, options: tuple[str, ...], word: str
+    shell: Shell, rejects: Rejects, tmp_path: Path, options: tuple[str, ...], word: str
 ) -> None:
     shell("motions", "add", write_suite(tmp_path / "records"))
     shell("simulate", "--p2", "10,1", "--jobs", "1")
     shell("fit", "--term", "pgv")
-    assert word in refuses("predict", *options)
+    assert word in rejects("predict", *options)
 
 
-def test_simulate(shell: Shell, refuses: Refuses, record: Path) -> None:
+def test_simulate(shell: Shell, rejects: Rejects, record: Path) -> None:
     shell("motions", "add", record)
-    assert "'x'" in refuses("simulate", "--p2", "3,x")
-    assert "twice" in refuses("simulate", "--p2", "3,1,3")
-    assert "p2" in refuses("simulate", "--p2", "3,-1")
-    assert "--jobs" in refuses("simulate", "--jobs", "0")
-    assert "'nobody'" in refuses("simulate", "--suite", "nobody")
+    assert "'x'" in rejects("simulate", "--p2", "3,x")
+    assert "twice" in rejects("simulate", "--p2", "3,1,3")
+    assert "p2" in rejects("simulate", "--p2", "3,-1")
+    assert "--jobs" in rejects("simulate", "--jobs", "0")
+    assert "'nobody'" in rejects("simulate", "--suite", "nobody")
     assert shell.json("db", "info")["rows"]["campaign"] == 0
 
 
-def test_fit(shell: Shell, refuses: Refuses, record: Path) -> None:
+def test_fit(shell: Shell, rejects: Rejects, record: Path) -> None:
     shell("motions", "add", record)
-    assert "'pgx'" in refuses("fit", "--term", "pgx")
-    assert "'ols'" in refuses("fit", "--term", "pgv", "--method", "ols")
-    refuses("fit", "--term", "pgv")
+    assert "'pgx'" in rejects("fit", "--term", "pgx")
+    assert "'ols'" in rejects("fit", "--term", "pgv", "--method", "ols")
+    rejects("fit", "--term", "pgv")
     assert shell.json("models", "list", "--db", "rbfrag.db") == []
 
 
-def test_plot_folder_and_suffix(shell: Shell, refuses: Refuses, record: Path) -> None:
+def test_plot_folder_and_suffix(shell: Shell, rejects: Rejects, record: Path) -> None:
     options = ("respond", record, "--p2", "3", "--kr", "0.1", "--plot")
-    assert "nofolder" in refuses(*options, "nofolder/a.png")
-    assert ".xyz" in refuses(*options, "a.xyz")
+    assert "nofolder" in rejects(*options, "nofolder/a.png")
+    assert ".xyz" in rejects(*options, "a.xyz")
 
 
 def test_missing_option_is_a_usage_error(shell: Shell, record: Path) -> None:
@@ -186,9 +186,9 @@ def test_suspicious_dt_is_answered_with_a_warning(shell: Shell, tmp_path: Path) 
     ],
 )
 def test_wrong_command_lines_in_one_line(
-    refuses: Refuses, command: tuple[str, ...], words: str
+    rejects: Rejects, command: tuple[str, ...], words: str
 ) -> None:
-    assert words in refuses(*command)
+    assert words in rejects(*command)
 
 
 LONG = "a" * 300
@@ -208,8 +208,8 @@ LONG = "a" * 300
         ("demo", "--folder", LONG),
     ],
 )
-def test_a_name_that_no_file_can_have(refuses: Refuses, record: Path, words: list[str]) -> None:
-    refuses(*(word.format(record=record) for word in words))
+def test_a_name_that_no_file_can_have(rejects: Rejects, record: Path, words: list[str]) -> None:
+    rejects(*(word.format(record=record) for word in words))
 
 
 def test_metadata_may_name_what_no_file_can_be_called(

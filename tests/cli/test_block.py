@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 import rbfrag
-from tests.cli.conftest import Refuses, Shell
+from tests.cli.conftest import Rejects, Shell
 from tests.synthetic import shaking, write_at2, write_suite
 
 KEYS = {
@@ -123,8 +123,8 @@ def test_table_for_people(shell: Shell) -> None:
         (("--polygon", "nowhere.csv", *PLANES), "nowhere.csv: no such file"),
     ],
 )
-def test_refused(refuses: Refuses, options: tuple[str, ...], word: str) -> None:
-    assert word in refuses("block", *options)
+def test_rejected(rejects: Rejects, options: tuple[str, ...], word: str) -> None:
+    assert word in rejects("block", *options)
 
 
 def test_respond_and_predict_from_a_block_file(shell: Shell, tmp_path: Path) -> None:
@@ -159,10 +159,10 @@ def test_respond_and_predict_from_a_block_file(shell: Shell, tmp_path: Path) -> 
     ],
 )
 def test_only_the_model_that_the_mode_calls_for_is_run(
-    refuses: Refuses, tmp_path: Path, change: tuple[str, str], words: list[str]
+    rejects: Rejects, tmp_path: Path, change: tuple[str, str], words: list[str]
 ) -> None:
     (tmp_path / "b.toml").write_text(FILE.replace(*change))
-    message = refuses("predict", "--pgv", "0.6", "--block", "b.toml")
+    message = rejects("predict", "--pgv", "0.6", "--block", "b.toml")
     for word in (*words, "b.toml"):
         assert word in message
 
@@ -182,21 +182,21 @@ def test_a_confined_block_is_answered_for_by_its_own_model(shell: Shell, tmp_pat
         (("phi_deg = 35", "phi_deg = 35\nkv = 0.2"), "kv"),
     ],
 )
-def test_respond_refuses_what_no_motion_decides(
-    refuses: Refuses, tmp_path: Path, change: tuple[str, str], word: str
+def test_respond_rejects_what_no_motion_decides(
+    rejects: Rejects, tmp_path: Path, change: tuple[str, str], word: str
 ) -> None:
     (tmp_path / "b.toml").write_text(FILE.replace(*change))
     record = write_at2(tmp_path / "record.AT2", shaking(3))
-    message = refuses("respond", record, "--block", "b.toml")
+    message = rejects("respond", record, "--block", "b.toml")
     assert word in message
     assert "b.toml" in message
 
 
-def test_a_block_is_given_once(refuses: Refuses, tmp_path: Path) -> None:
+def test_a_block_is_given_once(rejects: Rejects, tmp_path: Path) -> None:
     (tmp_path / "b.toml").write_text(FILE)
-    assert "--p2" in refuses("predict", "--pgv", "1", "--block", "b.toml", "--p2", "3")
-    assert "--kr" in refuses("predict", "--pgv", "1", "--block", "b.toml", "--kr", "0.1")
-    assert "--p2 is missing" in refuses("predict", "--pgv", "1")
+    assert "--p2" in rejects("predict", "--pgv", "1", "--block", "b.toml", "--p2", "3")
+    assert "--kr" in rejects("predict", "--pgv", "1", "--block", "b.toml", "--kr", "0.1")
+    assert "--p2 is missing" in rejects("predict", "--pgv", "1")
 
 
 def test_block_starts_without_the_heavy_libraries() -> None:

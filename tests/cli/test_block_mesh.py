@@ -1,4 +1,4 @@
-"""`rbfrag block --mesh`: the answers of Python, a table that other commands read, refusals."""
+"""`rbfrag block --mesh`: the answers of Python, a table that other commands read, rejections."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import pytest
 
 import rbfrag
 from tests.block_tables import read_columns
-from tests.cli.conftest import Refuses, Shell
+from tests.cli.conftest import Rejects, Shell
 from tests.conftest import ROOT
 from tests.meshes import box, write_obj
 
@@ -81,21 +81,21 @@ def test_the_page_lists_the_columns_of_the_table(shell: Shell) -> None:
         (("--plot", "block.jpg"), "block.jpg"),
     ],
 )
-def test_refused(refuses: Refuses, options: tuple[str, ...], words: str) -> None:
-    assert words in refuses("block", "--mesh", BOULDER, *options)
+def test_rejected(rejects: Rejects, options: tuple[str, ...], words: str) -> None:
+    assert words in rejects("block", "--mesh", BOULDER, *options)
 
 
 @pytest.mark.parametrize("option", [("--up", "y"), ("--contact-mm", "5"), ("--out", "a.csv")])
-def test_options_of_a_mesh_need_one(refuses: Refuses, option: tuple[str, str]) -> None:
-    message = refuses("block", "--height", "2", "--width", "1", *option)
+def test_options_of_a_mesh_need_one(rejects: Rejects, option: tuple[str, str]) -> None:
+    message = rejects("block", "--height", "2", "--width", "1", *option)
     assert f"{option[0]} requires --mesh" in message
 
 
 @pytest.mark.parametrize("suffix", ["obj", "ply", "stl"])
 @pytest.mark.parametrize("content", [b"", b"\xff\x00" * 200, b"solid a\nfacet normal\n"])
-def test_rubbish_is_refused(refuses: Refuses, suffix: str, content: bytes, tmp_path: Path) -> None:
+def test_rubbish_is_rejected(rejects: Rejects, suffix: str, content: bytes, tmp_path: Path) -> None:
     (tmp_path / f"a.{suffix}").write_bytes(content)
-    assert f"a.{suffix}" in refuses("block", "--mesh", f"a.{suffix}")
+    assert f"a.{suffix}" in rejects("block", "--mesh", f"a.{suffix}")
 
 
 def test_doubts_stand_below_the_answer(shell: Shell, tmp_path: Path) -> None:

@@ -10,7 +10,7 @@ import pytest
 
 import rbfrag
 from rbfrag.exchange.nrml import read_nrml
-from tests.cli.conftest import Refuses, Shell
+from tests.cli.conftest import Rejects, Shell
 from tests.exchange.test_shakemap_grid import GRID
 from tests.synthetic import shaking, write_at2
 
@@ -111,13 +111,13 @@ def test_block_tells_the_numbers_of_a_rectangle(shell: Shell) -> None:
 
 
 def test_the_mode_of_a_rectangle_is_checked_where_friction_is_known(
-    shell: Shell, refuses: Refuses
+    shell: Shell, rejects: Rejects
 ) -> None:
     asked = ("predict", *SIDES, "--pgv", "0.6")
     said = shell.json(*asked)["warnings"]
     assert any("assumed to topple" in text for text in said)
     assert not any("assumed to topple" in t for t in shell.json(*asked, "--phi", "45")["warnings"])
-    assert "the block slides" in refuses(*asked, "--phi", "10")
+    assert "the block slides" in rejects(*asked, "--phi", "10")
 
 
 ALPHA1 = ("--alpha1", "-10", "--alpha3", "20", "--r3", "1")
@@ -148,20 +148,20 @@ ALPHA1 = ("--alpha1", "-10", "--alpha3", "20", "--r3", "1")
     ],
 )
 def test_descriptions_that_do_not_go_together(
-    refuses: Refuses, options: tuple[str, ...], words: str
+    rejects: Rejects, options: tuple[str, ...], words: str
 ) -> None:
-    assert words in refuses("predict", *options, "--pgv", "0.6")
+    assert words in rejects("predict", *options, "--pgv", "0.6")
 
 
 def test_respond_needs_friction_for_the_film_of_a_rectangle(
-    shell: Shell, refuses: Refuses, files: Path
+    shell: Shell, rejects: Rejects, files: Path
 ) -> None:
     asked = ("respond", "record.AT2", *SIDES)
-    assert "requires the block geometry and --phi" in refuses(*asked, "--film", "a.gif")
+    assert "requires the block geometry and --phi" in rejects(*asked, "--film", "a.gif")
     for command in ("respond", "critical"):
         said = shell.json(command, *asked[1:])["warnings"]
         assert any("assumed to topple" in text for text in said)
-    assert "--phi is missing" in refuses("critical", *asked[1:], "--kind", "slumping")
+    assert "--phi is missing" in rejects("critical", *asked[1:], "--kind", "slumping")
 
 
 def test_tables_of_rectangles(shell: Shell, files: Path) -> None:
@@ -192,7 +192,7 @@ def test_tables_of_rectangles(shell: Shell, files: Path) -> None:
     assert found["annual_rate"] == pytest.approx(alone["annual_rate"], rel=1e-12)
 
 
-def test_a_table_without_blocks_says_what_it_needs(refuses: Refuses, files: Path) -> None:
+def test_a_table_without_blocks_says_what_it_needs(rejects: Rejects, files: Path) -> None:
     (files / "blocks.csv").write_text("block_id,height_m\nA,2\n")
-    message = refuses("hazard", "curve.csv", "--blocks", "blocks.csv")
+    message = rejects("hazard", "curve.csv", "--blocks", "blocks.csv")
     assert "width is missing; the columns are" in message

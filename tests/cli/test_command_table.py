@@ -1,4 +1,4 @@
-"""The table of commands, the objects that options travel in, and what is refused."""
+"""The table of commands, the objects that options travel in, and what is rejected."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ from typer.testing import CliRunner
 
 from rbfrag.cli.main import COMMANDS, app
 from rbfrag.cli.parameters import options
-from rbfrag.cli.parameters.refusals import CONFLICTS, NEEDS, refuse
-from rbfrag.cli.parameters.stack import stacked
+from rbfrag.cli.parameters.option_groups import stacked
+from rbfrag.cli.parameters.option_rules import CONFLICTS, NEEDS, reject
 from rbfrag.errors import InputError
 from rbfrag.vocabulary.quantities import option_of
 
@@ -106,7 +106,7 @@ def test_a_command_gets_the_object_and_the_shell_its_fields(
     assert "--two" in run(made, ["--help"]).stdout
 
 
-def test_what_was_given_is_said_by_field_and_two_words_of_one_are_refused() -> None:
+def test_what_was_given_is_said_by_field_and_two_words_of_one_are_rejected() -> None:
     made = typer.Typer(add_completion=False)
 
     @made.command()
@@ -119,25 +119,25 @@ def test_what_was_given_is_said_by_field_and_two_words_of_one_are_refused() -> N
     assert run(made, ["--dip", "3", "--no-back", "--kind", "rocking", "--pga", "0.3"]).stdout == (
         "{'beta_deg': 3.0, 'back_fracture': False, 'kind': 'rocking'} {'pga_g': 0.3}\n"
     )
-    refused = run(made, ["--dip", "3", "--beta", "3"]).exception
-    assert isinstance(refused, InputError)
-    assert refused.spelled(option_of).startswith("--beta cannot be combined with --dip")
+    rejected = run(made, ["--dip", "3", "--beta", "3"]).exception
+    assert isinstance(rejected, InputError)
+    assert rejected.spelled(option_of).startswith("--beta cannot be combined with --dip")
 
 
-def test_the_table_refuses_by_what_is_given_and_known() -> None:
-    refuse("any", ["--p2", "--kr"], ["--p2", "--kr", "--motion", "--vertical"])
+def test_the_table_rejects_by_what_is_given_and_known() -> None:
+    reject("any", ["--p2", "--kr"], ["--p2", "--kr", "--motion", "--vertical"])
     with pytest.raises(
         InputError, match=r"--block cannot be combined with --p2: give one description"
     ):
-        refuse("any", ["--p2", "--block"], ["--p2", "--block"])
+        reject("any", ["--p2", "--block"], ["--p2", "--block"])
     with pytest.raises(
         InputError, match=r"--vertical requires --motion: give also the accelerogram"
     ):
-        refuse("any", ["--vertical"], ["--motion", "--vertical"])
-    refuse("respond", ["--vertical"], ["--vertical"])  # its motion is an argument
-    refuse("predict", ["--model"], ["--model", "--pgv"])
+        reject("any", ["--vertical"], ["--motion", "--vertical"])
+    reject("respond", ["--vertical"], ["--vertical"])  # its motion is an argument
+    reject("predict", ["--model"], ["--model", "--pgv"])
     with pytest.raises(InputError, match="--model requires an intensity measure"):
-        refuse("rockmass", ["--model"], ["--model", "--pgv"])
+        reject("rockmass", ["--model"], ["--model", "--pgv"])
 
 
 def test_every_option_of_the_table_is_one_of_a_command() -> None:

@@ -1,4 +1,4 @@
-"""`rbfrag critical --kind`: the same numbers as from Python, and clear refusals."""
+"""`rbfrag critical --kind`: the same numbers as from Python, and clear rejections."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.critical import critical
 from rbfrag.solver.models.sliding import KY_OVER_PGA, sliding_displacements
 from rbfrag.solver.results import Outcome
-from tests.cli.conftest import Refuses, Shell
+from tests.cli.conftest import Rejects, Shell
 
 SLUMP = "alpha1_deg = 56\nalpha3_deg = 76\nr3_m = 0.7\nbeta_deg = 22\nphi_deg = 30\n"
 
@@ -77,10 +77,10 @@ def test_sliding_says_how_far_the_block_slides(shell: Shell, record: Path) -> No
         (("--kind", "sliding", "--displacement", "far"), "'far' is not a number"),
     ],
 )
-def test_what_does_not_fit_the_kind_is_refused(
-    refuses: Refuses, record: Path, options: tuple[str, ...], words: str
+def test_what_does_not_fit_the_kind_is_rejected(
+    rejects: Rejects, record: Path, options: tuple[str, ...], words: str
 ) -> None:
-    assert words in refuses("critical", record, *options)
+    assert words in rejects("critical", record, *options)
 
 
 def test_a_block_chooses_its_kind_by_its_mode(shell: Shell, record: Path, slump: Path) -> None:
@@ -92,9 +92,9 @@ def test_a_block_chooses_its_kind_by_its_mode(shell: Shell, record: Path, slump:
     assert topples == shell.json("critical", record, "--p2", repr(block.p2))
 
 
-def test_a_block_of_another_mode_is_refused(refuses: Refuses, record: Path, slump: Path) -> None:
+def test_a_block_of_another_mode_is_rejected(rejects: Rejects, record: Path, slump: Path) -> None:
     slump.write_text(SLUMP.replace("phi_deg = 30", "phi_deg = 60"))
-    message = refuses("critical", record, "--kind", "slumping", "--block", slump)
+    message = rejects("critical", record, "--kind", "slumping", "--block", slump)
     assert "slump.toml: the block is not of kind slumping: its mode is slide" in message
 
 

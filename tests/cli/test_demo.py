@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from rbfrag.cli.commands.demo import NEXT
-from rbfrag.cli.parameters.stack import LONGEST_HELP, MOST_USED, OUTPUT
+from rbfrag.cli.parameters.option_groups import LONGEST_HELP, MOST_USED, OUTPUT
 from tests.cli.conftest import Shell, shell
 
 __all__ = ["shell"]

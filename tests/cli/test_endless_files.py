@@ -1,4 +1,4 @@
-"""Files without an end: refused at once by every command that takes a file."""
+"""Files without an end: rejected at once by every command that takes a file."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.cli.conftest import Refuses, Shell
+from tests.cli.conftest import Rejects, Shell
 
 BLOCK = ("--p2", "3", "--kr", "0.1")
 
@@ -56,13 +56,13 @@ def endless(folder: Path, kind: str, suffix: str) -> tuple[Path, Callable[[], No
 
 @pytest.mark.parametrize("kind", ["device", "pipe", "socket", "sparse"])
 @pytest.mark.parametrize("command", COMMANDS)
-def test_a_file_without_an_end_is_refused(
-    shell: Shell, refuses: Refuses, tmp_path: Path, command: str, kind: str
+def test_a_file_without_an_end_is_rejected(
+    shell: Shell, rejects: Rejects, tmp_path: Path, command: str, kind: str
 ) -> None:
     arguments, suffix = COMMANDS[command]
     path, close = endless(tmp_path, kind, suffix)
     try:
-        message = refuses(*arguments(path.name))
+        message = rejects(*arguments(path.name))
     finally:
         close()
     assert path.name in message

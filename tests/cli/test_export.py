@@ -15,7 +15,7 @@ from rbfrag.db.models import save_model
 from rbfrag.errors import InputError
 from rbfrag.exchange.nrml import read_nrml
 from rbfrag.exchange.pelicun_table import read_pelicun
-from tests.cli.conftest import Refuses, Shell
+from tests.cli.conftest import Rejects, Shell
 from tests.fragility.conftest import model_row
 from tests.hazards.conftest import measure_row
 
@@ -55,7 +55,7 @@ def test_pelicun_of_one_block_in_pga(shell: Shell) -> None:
     assert np.abs(found.at(x) - expected).max() < 1.2 * told["largest_relative_error"] + 1e-5
 
 
-def test_functions_of_free_standing_blocks(shell: Shell, refuses: Callable[..., str]) -> None:
+def test_functions_of_free_standing_blocks(shell: Shell, rejects: Callable[..., str]) -> None:
     Path("blocks.csv").write_text("p2_1_s2,kr,restitution\n3,0.1,0.8\n10,0.3,\n")
     rocking = ("--kind", "rocking", "--levels", "300")
     told = shell.json("export", "nrml", "--blocks", "blocks.csv", *rocking, "--out", "a.xml")
@@ -75,7 +75,7 @@ def test_functions_of_free_standing_blocks(shell: Shell, refuses: Callable[..., 
     assert "Overturning of free-standing rock blocks" in Path("a.xml").read_text()
     assert "that stands free" in json.loads(Path("a.json").read_text())["block"]["Description"]
     backed = ("export", "nrml", "--p2", "3", "--kr", "0.1", "--out", "b.xml")
-    message = refuses(*backed, "--restitution", "0.8", "--kind", "toppling")
+    message = rejects(*backed, "--restitution", "0.8", "--kind", "toppling")
     assert "--restitution cannot be combined with kind toppling" in message
     with pytest.raises(InputError, match="shares require a rock mass"):
         rbfrag.export.nrml("b.xml", 3.0, 0.1, kind="rocking", shares=[50.0])
@@ -97,14 +97,14 @@ def test_nrml_of_a_spectral_acceleration(shell: Shell) -> None:
 
 @pytest.mark.usefixtures("database")
 def test_an_exported_curve_is_drawn_beside_its_origin(
-    shell: Shell, refuses: Callable[..., str]
+    shell: Shell, rejects: Callable[..., str]
 ) -> None:
     block = ("--p2", "3", "--kr", "0.1")
     shell("export", "nrml", *block, "--name", "boulder", "--out", "a.xml")
     shell("plot", "curve", *block, "--compare", "a.xml", "--out", "a.svg")
     assert "boulder, toppled" in Path("a.svg").read_text()
     shell("export", "pelicun", *block, "--imt", "PGA", "--out", "a.csv")
-    message = refuses("plot", "curve", *block, "--compare", "a.csv", "--out", "b.svg")
+    message = rejects("plot", "curve", *block, "--compare", "a.csv", "--out", "b.svg")
     assert "no fragility over pgv_m_s; there are PGA" in message
 
 
@@ -148,7 +148,7 @@ def test_a_rock_mass_is_the_mean_of_its_toppling_blocks(shell: Shell) -> None:
 
 
 @pytest.mark.usefixtures("database")
-def test_a_rock_mass_with_several_limit_states(shell: Shell, refuses: Callable[..., str]) -> None:
+def test_a_rock_mass_with_several_limit_states(shell: Shell, rejects: Callable[..., str]) -> None:
     Path("mass.toml").write_text(
         "realisations = 100\nseed = 2\n[base]\ndip_deg = 5.0\n"
         'spacing_m = { distribution = "uniform", low = 1.0, high = 2.0 }\n'
@@ -160,9 +160,9 @@ def test_a_rock_mass_with_several_limit_states(shell: Shell, refuses: Callable[.
     assert [(f.name, f.limit_state) for f in read_nrml("a.xml")] == [
         ("face", f"failed_{share}_percent") for share in (1, 10, 50)
     ]
-    assert "'x' is not a number" in refuses(*mass, "--shares", "1,x")
+    assert "'x' is not a number" in rejects(*mass, "--shares", "1,x")
     other = ("export", "nrml", "--p2", "3", "--kr", "0.1", "--out", "b.xml", "--shares", "50")
-    assert "--shares" in refuses(*other)
+    assert "--shares" in rejects(*other)
 
 
 @pytest.mark.usefixtures("database")
@@ -195,23 +195,23 @@ def test_pelicun_has_a_description_beside_the_table(shell: Shell) -> None:
         (("--blocks", "twice.csv"), "'A7' occurs twice"),
     ],
 )
-def test_refusals(refuses: Callable[..., str], options: tuple[str, ...], words: str) -> None:
+def test_rejections(rejects: Callable[..., str], options: tuple[str, ...], words: str) -> None:
     Path("bad.csv").write_text("block_id,p2_1_s2,kr\nA7,3,-1\n")
     Path("twice.csv").write_text("block_id,p2_1_s2,kr\nA7,3,0.1\nB,3,0.1\nA7,3,0.1\n")
-    assert words in refuses("export", "nrml", *options, "--out", "a.xml")
+    assert words in rejects("export", "nrml", *options, "--out", "a.xml")
     assert not Path("a.xml").exists()
 
 
 @pytest.mark.usefixtures("database")
-def test_the_suffix_is_checked_first(refuses: Callable[..., str]) -> None:
-    assert "unsupported suffix '.csv'; use .xml" in refuses(
+def test_the_suffix_is_checked_first(rejects: Callable[..., str]) -> None:
+    assert "unsupported suffix '.csv'; use .xml" in rejects(
         "export", "nrml", "--p2", "3", "--kr", "1", "--out", "a.csv"
     )
 
 
-def test_the_measures_that_work_are_named_and_no_others(refuses: Refuses) -> None:
+def test_the_measures_that_work_are_named_and_no_others(rejects: Rejects) -> None:
     for imt in ("SA(0.3)", "SA(2.0)", "SA(3.0)"):
-        message = refuses(
+        message = rejects(
             "export", "nrml", "--p2", "3", "--kr", "0.1", "--imt", imt, "--out", "a.xml"
         )
         assert message.endswith(f"{imt}: no model reads it alone: use one of PGV, PGA, SA(1)")

@@ -13,10 +13,10 @@ import pytest
 import rbfrag
 from rbfrag.db.engine import opened_database
 from rbfrag.db.models import save_model
-from rbfrag.hazards.answer import counted
+from rbfrag.hazards.hazard_rates import counted
 from rbfrag.results.numbers import annual_rate, place, return_period
 from tests.block_tables import read_columns
-from tests.cli.conftest import Refuses, Shell
+from tests.cli.conftest import Rejects, Shell
 from tests.fragility.conftest import model_row
 
 
@@ -171,8 +171,8 @@ def test_blocks_stand_at_sites_by_their_id(shell: Shell, curve: Path, logic_tree
     counts = [[each["count"] for each in one["annual_rate_at_least"]]
               for one in both["sites"] if "annual_rate_at_least" in one]  # fmt: skip
     assert counts == [[1, 2]]
-    refused = shell("hazard", mean, "--blocks", "blocks.csv", "--at-least", "3", expect=2).stderr
-    assert "at least 3 failures of" in refused
+    rejected = shell("hazard", mean, "--blocks", "blocks.csv", "--at-least", "3", expect=2).stderr
+    assert "at least 3 failures of" in rejected
     only = shell.json("hazard", mean, "--blocks", "blocks.csv", "--site", "0012")
     assert [row["block_id"] for row in only["blocks"]] == ["B", "C"]
     Path("blocks.csv").write_text(head + "A,3,0.1,12\n")
@@ -306,31 +306,31 @@ def test_plot(shell: Shell, curve: Path) -> None:
         ("pgv_m_s,annual_rate\n0.1,0.01\n0.5,0.02\n", (), "the rate rises"),
     ],
 )  # fmt: skip
-def test_refusals(
-    refuses: Callable[..., str], curve: Path, text: str, options: tuple[str, ...], words: str
+def test_rejections(
+    rejects: Callable[..., str], curve: Path, text: str, options: tuple[str, ...], words: str
 ) -> None:
     Path("other.csv").write_text(text)
-    message = refuses("hazard", "other.csv", "--p2", "3", "--kr", "0.1", *options)
+    message = rejects("hazard", "other.csv", "--p2", "3", "--kr", "0.1", *options)
     assert words in message
 
 
-def test_blocks_that_do_not_wait_are_refused(refuses: Callable[..., str], curve: Path) -> None:
+def test_blocks_that_do_not_wait_are_rejected(rejects: Callable[..., str], curve: Path) -> None:
     Path("blocks.csv").write_text("block_id,p2_1_s2,kr\nA7,3,-0.1\n")
-    assert "block A7" in refuses("hazard", curve, "--blocks", "blocks.csv")
-    assert "--blocks cannot be combined with --p2" in refuses(
+    assert "block A7" in rejects("hazard", curve, "--blocks", "blocks.csv")
+    assert "--blocks cannot be combined with --p2" in rejects(
         "hazard", curve, "--blocks", "blocks.csv", "--p2", "3"
     )
 
 
 @pytest.mark.parametrize(("p2", "kr"), [("0", "0.1"), ("nan", "0.1"), ("3", "-0.1"), ("3", "inf")])
-def test_a_block_that_waits_for_no_earthquake_is_refused(
+def test_a_block_that_waits_for_no_earthquake_is_rejected(
     shell: Shell, curve: Path, p2: str, kr: str
 ) -> None:
     told = shell("hazard", curve, f"--p2={p2}", f"--kr={kr}", expect=2).stderr
     assert "above" in told or "is not a number" in told or "beyond any block" in told
 
 
-def test_free_standing_blocks_with_their_restitution(shell: Shell, refuses: Refuses) -> None:
+def test_free_standing_blocks_with_their_restitution(shell: Shell, rejects: Rejects) -> None:
     Path("curve.csv").write_text("pgv_m_s,annual_rate\n0.05,0.02\n0.5,0.002\n2,0.0001\n")
     Path("b.csv").write_text(
         "block_id,p2_1_s2,kr,restitution,kr_sigma\nA,7,0.2,,0.1\nB,7,0.2,0.8,\n"
@@ -350,10 +350,10 @@ def test_free_standing_blocks_with_their_restitution(shell: Shell, refuses: Refu
     assert shape["annual_rate"] == pytest.approx(kr["annual_rate"], rel=1e-6)
     backed = ("hazard", "curve.csv", "--p2", "7", "--kr", "0.2", "--restitution", "0.8")
     assert shell.json(*backed)["model"] == "rocking-pgv"
-    refused = refuses(*backed, "--kind", "toppling")
-    assert "--restitution cannot be combined with kind toppling" in refused
+    rejected = rejects(*backed, "--kind", "toppling")
+    assert "--restitution cannot be combined with kind toppling" in rejected
     wrong = (*asked, "--p2", "7", "--kr", "0.2", "--restitution", "1.2")
-    assert "restitution = 1.2" in refuses(*wrong)
+    assert "restitution = 1.2" in rejects(*wrong)
 
 
 def test_a_standing_rock_is_uncertain_in_its_restitution_too(shell: Shell) -> None:
@@ -387,8 +387,8 @@ def test_warnings_are_counted_by_kind() -> None:
     assert counted(texts) == ("curve 1: coarse (and 2 more of the kind)", "of all")
 
 
-def test_several_blocks_without_a_site_are_refused(refuses: Refuses, logic_tree: Path) -> None:
+def test_several_blocks_without_a_site_are_rejected(rejects: Rejects, logic_tree: Path) -> None:
     Path("blocks.csv").write_text("block_id,p2_1_s2,kr\nA,3,0.1\nB,10,0.2\n")
     mean = logic_tree / "hazard_curve-mean-PGV_7.csv"
-    told = refuses("hazard", mean, "--blocks", "blocks.csv")
+    told = rejects("hazard", mean, "--blocks", "blocks.csv")
     assert "2 of 2 blocks have no site" in told

@@ -13,7 +13,7 @@ from rbfrag.db.engine import opened_database
 from rbfrag.db.models import save_model
 from rbfrag.exchange.event_losses import losses
 from rbfrag.hazards.event_counts import count_years
-from tests.cli.conftest import Refuses, Shell
+from tests.cli.conftest import Rejects, Shell
 from tests.exchange.openquake_job import write_job
 from tests.fragility.conftest import model_row
 
@@ -105,18 +105,18 @@ def test_files_by_name_and_time_by_option(shell: Shell, job: Path) -> None:
     assert named == whole
 
 
-def test_what_is_refused(refuses: Refuses, job: Path) -> None:
+def test_what_is_rejected(rejects: Rejects, job: Path) -> None:
     blocks = ("--blocks", "blocks.csv")
-    assert "there is no file of gmf-data" in refuses("losses", *blocks)
-    assert "is not a folder" in refuses("losses", "nowhere", *blocks)
-    assert "no column gmv_PGA" in refuses("losses", job, *blocks, "--imt", "PGA")
-    assert "--samples" in refuses("losses", job, *blocks, "--expected", "--samples", "5")
-    assert "--plot cannot be combined with" in refuses(
+    assert "there is no file of gmf-data" in rejects("losses", *blocks)
+    assert "is not a folder" in rejects("losses", "nowhere", *blocks)
+    assert "no column gmv_PGA" in rejects("losses", job, *blocks, "--imt", "PGA")
+    assert "--samples" in rejects("losses", job, *blocks, "--expected", "--samples", "5")
+    assert "--plot cannot be combined with" in rejects(
         "losses", job, *blocks, "--expected", "--plot", "a.svg"
     )
-    assert "--jobs" in refuses("losses", job, *blocks, "--jobs", "0")
+    assert "--jobs" in rejects("losses", job, *blocks, "--jobs", "0")
     Path("blocks.csv").write_text("".join(BLOCKS.replace("0012", "12").splitlines(True)[:2]))
-    assert "stands at site '12'" in refuses("losses", job, *blocks)
+    assert "stands at site '12'" in rejects("losses", job, *blocks)
 
 
 def test_a_scenario(shell: Shell, job: Path) -> None:

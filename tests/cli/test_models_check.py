@@ -14,7 +14,7 @@ from rbfrag.db.insert import update_rows
 from rbfrag.db.location import REFERENCE
 from rbfrag.db.schema import fragility_model
 from rbfrag.db.upgrade import upgrade_database
-from tests.cli.conftest import Refuses, Shell
+from tests.cli.conftest import Rejects, Shell
 from tests.synthetic import write_suite
 
 
@@ -82,8 +82,8 @@ def test_a_model_that_cannot_be_read_is_told(shell: Shell, database: Path) -> No
     assert "'guess', which is not supported by this version" in " ".join(told.split())
 
 
-def test_without_a_database_it_is_refused(refuses: Refuses, tmp_path: Path) -> None:
-    assert "none.db" in refuses("models", "check", "--db", tmp_path / "none.db")
+def test_without_a_database_it_is_rejected(rejects: Rejects, tmp_path: Path) -> None:
+    assert "none.db" in rejects("models", "check", "--db", tmp_path / "none.db")
 
 
 def test_models_are_listed_where_none_is_named(shell: Shell) -> None:
@@ -91,18 +91,18 @@ def test_models_are_listed_where_none_is_named(shell: Shell) -> None:
 
 
 def test_a_campaign_of_two_sizes_ends_in_one_sentence(
-    shell: Shell, refuses: Refuses, tmp_path: Path
+    shell: Shell, rejects: Rejects, tmp_path: Path
 ) -> None:
     shell("motions", "add", write_suite(tmp_path / "records"))
     shell("simulate", "--p2", "10,1", "--jobs", "1")
-    message = refuses("fit", "--term", "pga", "--method", "bounded")
+    message = rejects("fit", "--term", "pga", "--method", "bounded")
     assert "do not identify the 5 parameters of method bounded" in message
 
 
 def test_a_default_is_chosen_in_a_copy_of_the_built_in_data(
-    shell: Shell, refuses: Refuses, tmp_path: Path
+    shell: Shell, rejects: Rejects, tmp_path: Path
 ) -> None:
-    said = refuses("models", "default", "logistic-sa10")
+    said = rejects("models", "default", "logistic-sa10")
     assert "copy" in said
     assert str(REFERENCE) in said
     assert "rbfrag db upgrade" in said

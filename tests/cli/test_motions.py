@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from rbfrag.motions.readers import read_motion
-from tests.cli.conftest import Refuses, Shell
+from tests.cli.conftest import Rejects, Shell
 from tests.motions import written_by_networks as written
 from tests.synthetic import shaking, write_at2
 
@@ -32,8 +32,8 @@ def recording(tmp_path: Path) -> Path:
 def test_add_says_what_it_processed(shell: Shell, recording: Path) -> None:
     answer = shell.json("motions", "add", recording)
     assert answer == {
-        "added": [1, 2, 3], "already_stored": [], "processed": [1, 2, 3], "failed": [], "warnings": [],
-        "not_read": [],
+        "added": [1, 2, 3], "already_stored": [], "processed": [1, 2, 3], "failed": [],
+        "warnings": [], "not_read": [],
     }  # fmt: skip
     rows = shell.json("motions", "list")
     assert set(rows[0]) >= LIST_KEYS
@@ -74,18 +74,18 @@ def test_export_and_back(shell: Shell, recording: Path, tmp_path: Path) -> None:
     assert back == stored
 
 
-def test_export_is_refused(shell: Shell, refuses: Refuses, recording: Path) -> None:
-    assert "3 traces" in refuses("motions", "export", recording, "--out", "a.csv")
-    assert "unsupported --format 'xls'" in refuses(
+def test_export_is_rejected(shell: Shell, rejects: Rejects, recording: Path) -> None:
+    assert "3 traces" in rejects("motions", "export", recording, "--out", "a.csv")
+    assert "unsupported --format 'xls'" in rejects(
         "motions", "export", f"{recording}#0", "--out", "a.xls"
     )
     assert not Path("a.csv").exists()
 
 
-def test_partial_files(shell: Shell, refuses: Refuses, tmp_path: Path) -> None:
+def test_partial_files(shell: Shell, rejects: Rejects, tmp_path: Path) -> None:
     path = write_at2(tmp_path / "a.AT2", shaking(1))
     path.write_text(path.read_text().replace("NPTS= 600", "NPTS= 700"))
-    assert "--allow-partial" in refuses("motions", "show", path)
+    assert "--allow-partial" in rejects("motions", "show", path)
     shown = shell.json("motions", "show", path, "--allow-partial")
     assert "partial" in shown["flags"]
     failed = shell("motions", "add", path, expect=1)
@@ -96,11 +96,11 @@ def test_partial_files(shell: Shell, refuses: Refuses, tmp_path: Path) -> None:
     assert "partial" in shell.json("motions", "show", "1")["flags"]
 
 
-def test_vertical_must_fit(shell: Shell, refuses: Refuses, tmp_path: Path) -> None:
+def test_vertical_must_fit(shell: Shell, rejects: Rejects, tmp_path: Path) -> None:
     horizontal = write_at2(tmp_path / "h.AT2", shaking(1))
     other = write_at2(tmp_path / "v.AT2", shaking(2), 0.01, component="UP")
     run = ("respond", horizontal, "--p2", "3", "--kr", "0.3", "--vertical")
-    assert "dt = 0.01 s, the horizontal 0.02 s" in refuses(*run, other)
+    assert "dt = 0.01 s, the horizontal 0.02 s" in rejects(*run, other)
     down = write_at2(tmp_path / "d.AT2", shaking(2), component="DOWN")
     up = write_at2(tmp_path / "u.AT2", -shaking(2), component="UP")
     turned, right = shell.json(*run, down), shell.json(*run, up)

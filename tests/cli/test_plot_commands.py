@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from rbfrag.db.location import REFERENCE
-from tests.cli.conftest import Refuses, Shell
+from tests.cli.conftest import Rejects, Shell
 from tests.synthetic import shaking, write_at2
 
 
@@ -25,7 +25,7 @@ def database(shell: Shell, tmp_path: Path) -> Path:
 
 
 def test_every_figure_of_the_database(
-    shell: Shell, refuses: Refuses, database: Path, tmp_path: Path
+    shell: Shell, rejects: Rejects, database: Path, tmp_path: Path
 ) -> None:
     figures = {
         "chart": (),
@@ -40,26 +40,26 @@ def test_every_figure_of_the_database(
         shell("plot", name, *options, "--out", path)
         assert path.stat().st_size > 5000, name
     # these motions have no vertical components
-    assert "run  rbfrag simulate  for both" in refuses(
+    assert "run  rbfrag simulate  for both" in rejects(
         "plot", "vertical", "--out", tmp_path / "v.png"
     )
     assert not (tmp_path / "v.png").exists()
 
 
-def test_a_curve_runs_over_what_is_named(shell: Shell, refuses: Refuses, tmp_path: Path) -> None:
+def test_a_curve_runs_over_what_is_named(shell: Shell, rejects: Rejects, tmp_path: Path) -> None:
     path = tmp_path / "over.svg"
     block = ("--db", REFERENCE, "--p2", "3", "--kr", "0.1", "--out", path)
     shell("plot", "curve", *block, "--over", "pga", "--pgv", "0.6")
     text = path.read_text(encoding="utf-8")
     assert "peak ground acceleration, PGA [g]" in text
     assert "PGV = 0.6 m/s" in text
-    assert "over = cav: use pgv, pga, pgd, sa10" in refuses(
+    assert "over = cav: use pgv, pga, pgd, sa10" in rejects(
         "plot", "curve", *block, "--over", "cav"
     )
-    assert "pgv_m_s is the axis of the curve" in refuses("plot", "curve", *block, "--pgv", "0.6")
+    assert "pgv_m_s is the axis of the curve" in rejects("plot", "curve", *block, "--pgv", "0.6")
 
 
-def test_a_curve_of_a_free_standing_block(shell: Shell, refuses: Refuses, tmp_path: Path) -> None:
+def test_a_curve_of_a_free_standing_block(shell: Shell, rejects: Rejects, tmp_path: Path) -> None:
     path = tmp_path / "free.svg"
     shape = ("--db", REFERENCE, "--height", "1", "--width", "0.25", "--out", path)
     for more in (
@@ -68,12 +68,12 @@ def test_a_curve_of_a_free_standing_block(shell: Shell, refuses: Refuses, tmp_pa
         done = shell("plot", "curve", *shape, *more)
         assert "model PGV, rocking" in path.read_text(encoding="utf-8")
         assert "no plane backs the block" not in done.stdout
-    told = refuses("plot", "curve", *shape, "--kind", "toppling", "--restitution", "0.9")
+    told = rejects("plot", "curve", *shape, "--kind", "toppling", "--restitution", "0.9")
     assert "restitution cannot be combined with kind toppling" in told
 
 
 def test_curves_of_blocks_that_slide_and_slump(
-    shell: Shell, refuses: Refuses, tmp_path: Path
+    shell: Shell, rejects: Rejects, tmp_path: Path
 ) -> None:
     path = tmp_path / "other.svg"
     drawn = ("plot", "curve", "--db", REFERENCE, "--out", path)
@@ -85,17 +85,17 @@ def test_curves_of_blocks_that_slide_and_slump(
     assert "model PGV, PGA, sliding" in path.read_text(encoding="utf-8")
     shell(*drawn, "--ks", "0.2", "--ps2", "3", "--pga", "0.5")
     assert "the block slumps" in path.read_text(encoding="utf-8")
-    told = refuses(*drawn, "--ky", "0.2", "--displacement", "0.1", "--over", "sa10")
+    told = rejects(*drawn, "--ky", "0.2", "--displacement", "0.1", "--over", "sa10")
     assert "no stored sliding model works with sa10_g" in told
 
 
-def test_yield_over_rotation(shell: Shell, refuses: Refuses, tmp_path: Path) -> None:
+def test_yield_over_rotation(shell: Shell, rejects: Rejects, tmp_path: Path) -> None:
     block = ("--alpha1", "45", "--alpha3", "65", "--r3", "1", "--beta", "0", "--phi", "35")
     answer = shell.json("plot", "rotation", *block, "--out", "r.png", "--back-follows", "0,1")
     assert (tmp_path / "r.png").stat().st_size > 5000
     stays, turns = answer["lines"]
     assert stays["least_g"] == stays["end_g"] < 0.49
     assert turns["least_g"] == pytest.approx(0.597, abs=1e-3)
-    assert "from 0 to 1" in refuses(
+    assert "from 0 to 1" in rejects(
         "plot", "rotation", *block, "--out", "r.png", "--back-follows", "2"
     )

@@ -8,7 +8,7 @@ from typing import Any
 import openpyxl
 import pytest
 
-from tests.cli.conftest import Refuses, Shell
+from tests.cli.conftest import Rejects, Shell
 
 ROWS: tuple[tuple[Any, ...], ...] = (
     (None, "Survey of the north wall"),
@@ -81,12 +81,12 @@ def test_the_list_on_the_terminal(shell: Shell, monkeypatch: pytest.MonkeyPatch)
 
 
 @pytest.mark.usefixtures("book")
-def test_every_command_reads_the_sheet(shell: Shell, refuses: Refuses) -> None:
+def test_every_command_reads_the_sheet(shell: Shell, rejects: Rejects) -> None:
     found = shell.json("hazard", "curve.csv", *ASKED)
     assert [row["block_id"] for row in found["blocks"]] == ["A7", "B2"]
     shell("survival", "curve.csv", *ASKED, "--kind", "rocking", "--age", "100")
     shell("export", "pelicun", *ASKED, "--out", "a.csv")
-    first = refuses("predict", "--pgv", "0.6", "--blocks", "survey.xlsx")
+    first = rejects("predict", "--pgv", "0.6", "--blocks", "survey.xlsx")
     assert "columns are Contents (of the first sheet; the sheets are Sheet, north wall)" in first
     for command in (
         ("predict", "--pgv", "0.6"),
@@ -97,12 +97,12 @@ def test_every_command_reads_the_sheet(shell: Shell, refuses: Refuses) -> None:
         ("export", "nrml", "--out", "a.xml"),
         ("plot", "modes", "--phi", "30", "--out", "a.png"),
     ):
-        message = refuses(*command, "--blocks", "survey.xlsx", "--sheet", "south wall")
+        message = rejects(*command, "--blocks", "survey.xlsx", "--sheet", "south wall")
         assert "no sheet 'south wall'; the sheets are Sheet, north wall" in message
     Path("a.csv").write_text("p2,kr\n3,0.1\n")
-    only = refuses("predict", "--pgv", "0.6", "--blocks", "a.csv", "--sheet", "x")
+    only = rejects("predict", "--pgv", "0.6", "--blocks", "a.csv", "--sheet", "x")
     assert "only workbooks (.xlsx) have sheets" in only
-    assert "--sheet requires --blocks" in refuses("predict", "--p2", "3", "--sheet", "x")
+    assert "--sheet requires --blocks" in rejects("predict", "--p2", "3", "--sheet", "x")
 
 
 def add_row(path: Path) -> None:
@@ -118,7 +118,7 @@ def add_row(path: Path) -> None:
 
 
 @pytest.mark.parametrize("suffix", ["xlsx", "csv"])
-def test_a_template_is_answered(shell: Shell, refuses: Refuses, suffix: str) -> None:
+def test_a_template_is_answered(shell: Shell, rejects: Rejects, suffix: str) -> None:
     name = f"blocks.{suffix}"
     assert f"predict --blocks {name}" in shell("block", "--template", name).stdout
     untouched = shell.json("predict", "--blocks", name, "--pgv", "0.6", "--component", "single")
@@ -132,9 +132,9 @@ def test_a_template_is_answered(shell: Shell, refuses: Refuses, suffix: str) -> 
     alone = of_one(shell, "2.4", "0.5", "3")
     assert row["block_id"] == "A1"
     assert row["probability"] == pytest.approx(alone["probability"], rel=1e-12)
-    assert "--template cannot be combined with --height" in refuses(
+    assert "--template cannot be combined with --height" in rejects(
         "block", "--template", name, "--height", "2"
     )
-    assert "unsupported suffix '.parquet'; use .xlsx, .csv" in refuses(
+    assert "unsupported suffix '.parquet'; use .xlsx, .csv" in rejects(
         "block", "--template", "a.parquet"
     )

@@ -1,4 +1,4 @@
-"""`predict --kind`, `fit --kind` and `simulate --kind`: as from Python, with clear refusals."""
+"""`predict --kind`, `fit --kind` and `simulate --kind`: as from Python, with clear rejections."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from rbfrag.question.question import predict
 from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.mechanism import shaken_mechanism
 from rbfrag.solver.models import model_of_kind
-from tests.cli.conftest import Refuses, Shell
+from tests.cli.conftest import Rejects, Shell
 from tests.synthetic import write_suite
 
 SLUMP = "alpha1_deg = 56\nalpha3_deg = 76\nr3_m = 0.7\nbeta_deg = 22\nphi_deg = 30\n"
@@ -103,20 +103,20 @@ def test_a_slump_is_answered_as_from_python(shell: Shell, block: Path) -> None:
         ),
     ],
 )
-def test_what_does_not_fit_is_refused(
-    refuses: Refuses, options: tuple[str, ...], words: str
+def test_what_does_not_fit_is_rejected(
+    rejects: Rejects, options: tuple[str, ...], words: str
 ) -> None:
-    assert words in refuses("predict", *options)
+    assert words in rejects("predict", *options)
 
 
-def test_a_block_of_another_mode_is_refused(refuses: Refuses, block: Path) -> None:
+def test_a_block_of_another_mode_is_rejected(rejects: Rejects, block: Path) -> None:
     block.write_text(SLIDE)
     asked = ("predict", "--block", block, *MOTION)
-    assert "the failure mode is slide" in refuses(*asked, "--kind", "slumping")
-    assert "give --displacement" in refuses(*asked)
+    assert "the failure mode is slide" in rejects(*asked, "--kind", "slumping")
+    assert "give --displacement" in rejects(*asked)
     block.write_text(SLUMP)
     distance = ("--displacement", "0.1")
-    assert "the failure mode is slump" in refuses(*asked, "--kind", "sliding", *distance)
+    assert "the failure mode is slump" in rejects(*asked, "--kind", "sliding", *distance)
 
 
 def test_a_campaign_is_run_fitted_and_asked(shell: Shell, tmp_path: Path) -> None:
@@ -139,14 +139,14 @@ def test_a_campaign_is_run_fitted_and_asked(shell: Shell, tmp_path: Path) -> Non
     assert "reference" not in told["data"]
 
 
-def test_options_of_one_kind_do_not_go_with_another(refuses: Refuses) -> None:
-    assert "--p2 requires --kind rocking or toppling" in refuses(
+def test_options_of_one_kind_do_not_go_with_another(rejects: Rejects) -> None:
+    assert "--p2 requires --kind rocking or toppling" in rejects(
         "simulate", "--kind", "sliding", "--p2", "1"
     )
-    assert "campaigns are of" in refuses("simulate", "--kind", "falling")
-    message = refuses("fit", "--kind", "sliding", "--term", "pgv", "--method", "wls")
+    assert "campaigns are of" in rejects("simulate", "--kind", "falling")
+    message = rejects("fit", "--kind", "sliding", "--term", "pgv", "--method", "wls")
     assert "method wls fits blocks with p2 and kr, not those of kind sliding" in message
-    assert "omit --rotation" in refuses("fit", "--term", "pgv", "--rotation", "2")
+    assert "omit --rotation" in rejects("fit", "--term", "pgv", "--rotation", "2")
 
 
 def test_a_rectangle_in_another_unit_is_doubted(shell: Shell) -> None:
@@ -156,14 +156,14 @@ def test_a_rectangle_in_another_unit_is_doubted(shell: Shell) -> None:
                                            "--pgv", "0.6").stdout  # fmt: skip
 
 
-def test_a_block_that_fails_at_rest_is_said_to(shell: Shell, refuses: Refuses) -> None:
+def test_a_block_that_fails_at_rest_is_said_to(shell: Shell, rejects: Rejects) -> None:
     steep = ("--height", "2", "--width", "0.5", "--dip", "40", "--phi", "35", "--pgv", "0.3")
     told = shell.json("predict", *steep)
     assert told["probability"] == told["ci_low"] == told["ci_high"] == 1.0
     assert "it fails without an earthquake" in told["warnings"][0]
-    assert "rocking is free-standing" in refuses("predict", *steep, "--kind", "free")
+    assert "rocking is free-standing" in rejects("predict", *steep, "--kind", "free")
 
 
-def test_a_refusal_of_measures_names_options(refuses: Refuses) -> None:
-    told = refuses("predict", "--p2", "3", "--kr", "0.1", "--kind", "rocking", "--pga", "0.5")
+def test_a_rejection_of_measures_names_options(rejects: Rejects) -> None:
+    told = rejects("predict", "--p2", "3", "--kr", "0.1", "--kind", "rocking", "--pga", "0.5")
     assert "works with --pga: give --pga and --magnitude, or --pgv, or --sa10" in told

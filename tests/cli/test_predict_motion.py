@@ -10,7 +10,7 @@ import pytest
 
 import rbfrag
 from rbfrag.db.location import REFERENCE
-from tests.cli.conftest import Refuses, Shell
+from tests.cli.conftest import Rejects, Shell
 
 BLOCK = ("--p2", "3", "--kr", "0.05")
 
@@ -59,13 +59,15 @@ def test_a_stored_record_by_its_number(shell: Shell, record: Path, tmp_path: Pat
     assert math.isfinite(stored["ci_low"])
 
 
-def test_what_cannot_be_answered_is_refused(refuses: Refuses, record: Path, tmp_path: Path) -> None:
-    assert "record.AT2" in refuses("predict", *BLOCK, "--motion", f"{record}#7")
-    assert "pgv" in refuses("predict", *BLOCK, "--motion", record, "--pgv", "0.3").lower()
-    assert "up" in refuses("predict", *BLOCK, "--motion", record, "--polarity", "up")
-    assert "none.AT2" in refuses("predict", *BLOCK, "--motion", tmp_path / "none.AT2")
+def test_what_cannot_be_answered_is_rejected(
+    rejects: Rejects, record: Path, tmp_path: Path
+) -> None:
+    assert "record.AT2" in rejects("predict", *BLOCK, "--motion", f"{record}#7")
+    assert "pgv" in rejects("predict", *BLOCK, "--motion", record, "--pgv", "0.3").lower()
+    assert "up" in rejects("predict", *BLOCK, "--motion", record, "--polarity", "up")
+    assert "none.AT2" in rejects("predict", *BLOCK, "--motion", tmp_path / "none.AT2")
 
 
-def test_a_reference_without_samples_says_so(refuses: Refuses, tmp_path: Path) -> None:
+def test_a_reference_without_samples_says_so(rejects: Rejects, tmp_path: Path) -> None:
     shutil.copy(REFERENCE, tmp_path / "rbfrag.db")
-    assert "samples" in refuses("predict", *BLOCK, "--motion", "1")
+    assert "samples" in rejects("predict", *BLOCK, "--motion", "1")

@@ -12,7 +12,7 @@ from rbfrag.db.engine import opened_database
 from rbfrag.db.models import save_model
 from rbfrag.question.question import predict
 from rbfrag.solver.block.geometry import Block
-from tests.cli.conftest import Refuses, Shell
+from tests.cli.conftest import Rejects, Shell
 from tests.fragility.test_overturning import T2, stored
 
 MOTION = ("--pgv", "0.6", "--pga", "0.5", "--db", "own.db")
@@ -116,16 +116,16 @@ def test_draws_of_a_scanned_rock_are_one_block(shell: Shell) -> None:
         (("--height", "2", "--width", "1", "--phi", "10"), "the failure mode is slide"),
     ],
 )
-def test_what_is_no_free_standing_block_is_refused(
-    refuses: Refuses, more: tuple[str, ...], words: str
+def test_what_is_no_free_standing_block_is_rejected(
+    rejects: Rejects, more: tuple[str, ...], words: str
 ) -> None:
-    assert words in refuses(*ASKED, *more, *MOTION)
+    assert words in rejects(*ASKED, *more, *MOTION)
 
 
 def test_block_names_the_command_for_a_block_that_stands_free(
-    shell: Shell, refuses: Refuses
+    shell: Shell, rejects: Rejects
 ) -> None:
     shape = ("block", "--height", "2", "--width", "0.5", "--no-back")
-    assert "no friction angle is required with --kind rocking" in refuses(*shape)
+    assert "no friction angle is required with --kind rocking" in rejects(*shape)
     warned = shell.json(*shape, "--phi", "40")["warnings"]
     assert any("rbfrag predict --kind rocking" in text for text in warned)

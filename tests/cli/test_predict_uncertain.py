@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from rbfrag.question.question import predict
-from tests.cli.conftest import Refuses, Shell
+from tests.cli.conftest import Rejects, Shell
 
 ASKED = ("predict", "--p2", "3", "--kr", "0.1", "--pgv", "0.6")
 DRAWS = "block_id,p2_1_s2,kr,weight\nrock,3,0.1,1\nrock,2.5,0.12,3\n"
@@ -46,14 +46,14 @@ def test_draws_of_a_table_are_one_block(shell: Shell) -> None:
         (("--block-draws", "draws.csv"), "--block-draws cannot be combined with --p2"),
     ],
 )
-def test_what_does_not_fit_is_refused(refuses: Refuses, more: tuple[str, ...], words: str) -> None:
+def test_what_does_not_fit_is_rejected(rejects: Rejects, more: tuple[str, ...], words: str) -> None:
     Path("draws.csv").write_text(DRAWS)
-    assert words in refuses(*ASKED, *more)
+    assert words in rejects(*ASKED, *more)
 
 
-def test_a_known_motion_is_simulated_instead(refuses: Refuses, tmp_path: Path) -> None:
+def test_a_known_motion_is_simulated_instead(rejects: Rejects, tmp_path: Path) -> None:
     record = tmp_path / "a.csv"
     record.write_text("0\n0.1\n-0.2\n0\n")
     asked = ("predict", "--p2", "3", "--kr", "0.1", "--motion", record, "--dt", "0.1")
-    message = refuses(*asked, "--units", "g", "--kr-sigma", "0.1")
+    message = rejects(*asked, "--units", "g", "--kr-sigma", "0.1")
     assert "by rbfrag respond with draws" in message

@@ -114,7 +114,7 @@ def test_one_block_in_the_shell_has_its_sides(shell: Shell) -> None:
 
 
 def test_cohesion_of_all_rows_of_a_table(shell: Shell) -> None:
-    """What holds for all blocks is no column: it was refused as an array of numbers."""
+    """What holds for all blocks is no column: it was rejected as an array of numbers."""
     Path("curve.csv").write_text(CURVE)
     Path("blocks.csv").write_text("block_id,height_m,width_m,phi_deg\nB,2,0.5,10\nC,2,0.4,10\n")
     asked = ("hazard", "curve.csv", "--component", "rotd50")

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import rbfrag
-from tests.cli.conftest import Refuses, Shell
+from tests.cli.conftest import Rejects, Shell
 from tests.synthetic import shaking, write_at2
 
 ASKED = ("respond", "a.csv", "--units", "g", "--dt", "0.01", "--p2", "7")
@@ -65,13 +65,13 @@ def test_a_table_and_a_rectangle_are_drawn_from(shell: Shell) -> None:
         ),
     ],
 )
-def test_what_does_not_fit_is_refused(refuses: Refuses, more: tuple[str, ...], words: str) -> None:
-    assert words in refuses(*ASKED, *more)
+def test_what_does_not_fit_is_rejected(rejects: Rejects, more: tuple[str, ...], words: str) -> None:
+    assert words in rejects(*ASKED, *more)
 
 
-def test_shapes_without_numbers_are_refused(refuses: Refuses) -> None:
+def test_shapes_without_numbers_are_rejected(rejects: Rejects) -> None:
     shape = ("--s1", "1", "--s2", "0.6", "--gamma", "25", "--beta", "20", "--phi", "40")
-    assert "rockmass --motion" in refuses(*ASKED[:6], *shape, "--draws", "3")
+    assert "rockmass --motion" in rejects(*ASKED[:6], *shape, "--draws", "3")
 
 
 def test_what_never_moves_is_said_so(shell: Shell) -> None:

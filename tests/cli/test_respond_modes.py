@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.cli.conftest import Refuses, Shell
+from tests.cli.conftest import Rejects, Shell
 
 SLIDE = ("--s1", "1", "--s2", "2", "--gamma", "60", "--beta", "20", "--phi", "30")
 SLUMP = ("--alpha1", "45", "--alpha3", "65", "--r3", "1", "--beta", "0", "--phi", "35")
@@ -81,16 +81,16 @@ def test_sliding_by_its_yield_and_by_its_shape(shell: Shell, record: Path) -> No
         ((*SLUMP[:6], "--beta", "40", "--phi", "35"), "unstable"),
     ],
 )
-def test_refused(refuses: Refuses, record: Path, options: tuple[str, ...], word: str) -> None:
-    assert word in refuses("respond", record, *options)
+def test_rejected(rejects: Rejects, record: Path, options: tuple[str, ...], word: str) -> None:
+    assert word in rejects("respond", record, *options)
 
 
-def test_a_film_that_cannot_be_made_is_refused_before_anything_is_written(
-    refuses: Refuses, record: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+def test_a_film_that_cannot_be_made_is_rejected_before_anything_is_written(
+    rejects: Rejects, record: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("PATH", "")
     asked = ("respond", record, *SLUMP, "--csv", "m.csv", "--film", "m.mp4")
-    assert "use .gif or .html" in refuses(*asked)
+    assert "use .gif or .html" in rejects(*asked)
     assert list(tmp_path.iterdir()) == [record]
 
 
@@ -100,12 +100,12 @@ def test_a_model_against_the_mode_says_so(shell: Shell, record: Path) -> None:
     assert any("mode of the block is slump" in warning for warning in answer["warnings"])
 
 
-def test_cohesion_is_refused_where_motion_breaks_it(refuses: Refuses, record: Path) -> None:
+def test_cohesion_is_rejected_where_motion_breaks_it(rejects: Rejects, record: Path) -> None:
     Path("b.toml").write_text(
         "s1_m = 1\ns2_m = 2\ngamma_deg = 60\nbeta_deg = 20\nphi_deg = 30\n"
         "cohesion_pa = 100\ndensity_kg_m3 = 2700\n"
     )
-    assert "cohesion_pa" in refuses("respond", record, "--block", "b.toml")
+    assert "cohesion_pa" in rejects("respond", record, "--block", "b.toml")
 
 
 def test_a_block_without_a_back_plane_rocks(shell: Shell, record: Path, tmp_path: Path) -> None:
@@ -129,7 +129,7 @@ def test_a_block_without_a_back_plane_rocks(shell: Shell, record: Path, tmp_path
 
 
 def test_a_free_standing_rectangle_needs_no_friction(
-    shell: Shell, refuses: Refuses, record: Path
+    shell: Shell, rejects: Rejects, record: Path
 ) -> None:
     sides = ("--height", "1.2", "--width", "0.3")
     free = shell("respond", record, *sides, "--no-back", "--json")
@@ -145,9 +145,9 @@ def test_a_free_standing_rectangle_needs_no_friction(
     assert by_numbers["outcome"] == asked["outcome"]
     assert by_numbers["impacts"] == asked["impacts"]
     leans = ("--kind", "rocking", "--dip", "15")
-    assert "overturns forward over its toe at rest" in refuses("respond", record, *sides, *leans)
+    assert "overturns forward over its toe at rest" in rejects("respond", record, *sides, *leans)
     words = "restitution = 0: give the coefficient"
-    assert words in refuses("respond", record, *sides, "--no-back", "--restitution", "0")
+    assert words in rejects("respond", record, *sides, "--no-back", "--restitution", "0")
 
 
 def test_a_rocking_block_that_overturns_is_drawn(
@@ -173,7 +173,7 @@ water_m = 1.1372
 OUTLINE = "x_m,y_m,contact\n0,0,heel\n3.4641,0,toe\n2.3094,2,\n-1.1547,2,back\n"
 
 
-def test_a_block_file_with_water_is_answered(shell: Shell, refuses: Refuses, record: Path) -> None:
+def test_a_block_file_with_water_is_answered(shell: Shell, rejects: Rejects, record: Path) -> None:
     Path("wet.toml").write_text(BLOCK_FILE)
     wet = shell.json("respond", record, "--block", "wet.toml")
     assert wet["drained"]["yield_acceleration"] == pytest.approx(0.32492, abs=1e-5)
@@ -190,7 +190,7 @@ def test_a_block_file_with_water_is_answered(shell: Shell, refuses: Refuses, rec
     assert searched["kind"] == "sliding"
     comments = "\n".join(f"# {line}" for line in BLOCK_FILE.splitlines()[2:])
     Path("wet.csv").write_text(f"{comments}\n{OUTLINE}")
-    assert "not of outlines" in refuses("respond", record, "--polygon", "wet.csv")
+    assert "not of outlines" in rejects("respond", record, "--polygon", "wet.csv")
 
 
 def test_toe_and_modes_are_in_the_answer(shell: Shell, record: Path) -> None:
@@ -202,7 +202,7 @@ def test_toe_and_modes_are_in_the_answer(shell: Shell, record: Path) -> None:
     assert (numbers["toe_needs_deg"], numbers["toe_slips_g"]) == (None, None)
 
 
-def test_yields_over_a_rotation_are_dry(refuses: Refuses) -> None:
+def test_yields_over_a_rotation_are_dry(rejects: Rejects) -> None:
     Path("wet.toml").write_text(BLOCK_FILE)
-    said = refuses("plot", "rotation", "--block", "wet.toml", "--out", "a.png")
+    said = rejects("plot", "rotation", "--block", "wet.toml", "--out", "a.png")
     assert "cannot be combined with the yield over a rotation" in said

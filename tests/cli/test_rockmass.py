@@ -16,7 +16,7 @@ from rbfrag.rockmasses.counts import crossings, mode_counts
 from rbfrag.rockmasses.file import read_rock_mass
 from rbfrag.rockmasses.scenario import scenario
 from tests.block_tables import read_columns
-from tests.cli.conftest import Refuses, Shell
+from tests.cli.conftest import Rejects, Shell
 
 EXAMPLE = Path(__file__).resolve().parent.parent.parent / "docs" / "examples" / "rockmass.toml"
 
@@ -194,15 +194,15 @@ def test_a_block_is_drawn(shell: Shell) -> None:
         (("steep.toml", "--pgv", "1", "--db", "none.db"), "none.db"),
     ],
 )
-def test_refusals(
-    refuses: Refuses,
+def test_rejections(
+    rejects: Rejects,
     mass: Path,
     steep: Path,
     tmp_path: Path,
     arguments: tuple[str, ...],
     words: str,
 ) -> None:
-    assert words in refuses("rockmass", *arguments)
+    assert words in rejects("rockmass", *arguments)
     assert {path.name for path in tmp_path.iterdir()} == {"mass.toml", "steep.toml"}
 
 
@@ -216,11 +216,11 @@ def test_refusals(
         ("lognormal", "gamma", "back.spacing_m: distribution = 'gamma' is unknown"),
     ],
 )
-def test_files_are_refused_with_file_and_key(
-    refuses: Refuses, steep: Path, old: str, new: str, words: str
+def test_files_are_rejected_with_file_and_key(
+    rejects: Rejects, steep: Path, old: str, new: str, words: str
 ) -> None:
     steep.write_text(STEEP.replace(old, new, 1))
-    message = refuses("rockmass", steep)
+    message = rejects("rockmass", steep)
     assert words in message
     assert "steep.toml" in message
 
@@ -237,9 +237,9 @@ def test_files_are_refused_with_file_and_key(
         (("--phi", "35", "--blocks", "empty.csv"), "no valid block"),
     ],
 )
-def test_charts_are_refused(
-    refuses: Refuses, mass: Path, tmp_path: Path, arguments: tuple[str, ...], words: str
+def test_charts_are_rejected(
+    rejects: Rejects, mass: Path, tmp_path: Path, arguments: tuple[str, ...], words: str
 ) -> None:
     (tmp_path / "empty.csv").write_text("alpha1_deg,alpha3_deg\n,\n20,120\n30,10\n")
-    assert words in refuses("plot", "modes", *arguments, "--out", "a.png")
+    assert words in rejects("plot", "modes", *arguments, "--out", "a.png")
     assert not (tmp_path / "a.png").exists()

@@ -12,7 +12,7 @@ from rbfrag.rockmasses.failures import failures
 from rbfrag.rockmasses.file import read_rock_mass
 from rbfrag.rockmasses.shaking import FailureLimits, plan_shaking, run_blocks
 from tests.block_tables import read_columns
-from tests.cli.conftest import Refuses, Shell
+from tests.cli.conftest import Rejects, Shell
 from tests.synthetic import shaking, write_at2
 
 EXAMPLE = Path(__file__).resolve().parent.parent.parent / "docs" / "examples" / "rockmass.toml"
@@ -97,8 +97,8 @@ def test_a_stored_motion_by_its_number(shell: Shell, record: Path) -> None:
         (("--motion", "record.AT2", "--out", "blocks.txt"), "blocks.txt"),
     ],
 )
-def test_refused(
-    refuses: Refuses, record: Path, tmp_path: Path, options: tuple[str, ...], word: str
+def test_rejected(
+    rejects: Rejects, record: Path, tmp_path: Path, options: tuple[str, ...], word: str
 ) -> None:
-    assert word in refuses("rockmass", "mass.toml", "--n", "20", *options)
+    assert word in rejects("rockmass", "mass.toml", "--n", "20", *options)
     assert {path.name for path in tmp_path.iterdir()} == {"mass.toml", "record.AT2"}

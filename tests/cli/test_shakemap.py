@@ -15,7 +15,7 @@ from rbfrag.db.engine import opened_database
 from rbfrag.db.location import REFERENCE
 from rbfrag.db.models import save_model
 from tests.block_tables import read_columns
-from tests.cli.conftest import Refuses, Shell
+from tests.cli.conftest import Rejects, Shell
 from tests.exchange.test_shakemap_grid import GRID, UNCERTAINTY
 from tests.fragility.conftest import model_row
 
@@ -136,10 +136,10 @@ def test_geotiff(shell: Shell, grid: Path) -> None:
     assert np.isnan(bands["probability"][1, 1])
 
 
-def test_no_geotiff_of_what_is_no_grid(shell: Shell, refuses: Refuses, grid: Path) -> None:
+def test_no_geotiff_of_what_is_no_grid(shell: Shell, rejects: Rejects, grid: Path) -> None:
     pytest.importorskip("rasterio", reason="the extra gis is not installed")
     Path("b.csv").write_text("p2_1_s2,kr,lon,lat\n3,0.1,20.0,40.5\n")
-    message = refuses("shakemap", grid, "--blocks", "b.csv", "--out", "a.tif")
+    message = rejects("shakemap", grid, "--blocks", "b.csv", "--out", "a.tif")
     assert "not for blocks with coordinates" in message
     grid.write_text(grid.read_text().replace("20.5 41.0", "20.7 41.0"))
     told = shell("shakemap", grid, *ONE, "--out", "a.tif", expect=2).stderr
@@ -202,8 +202,8 @@ def test_nodes_without_a_number_are_left_out_and_counted(shell: Shell, grid: Pat
         (("--p2", "3", "--kr", "0.1", "--out", "a.csv", "--uncertainty", "grid.xml"), "STDPGV"),
     ],
 )
-def test_refusals(
-    refuses: Callable[..., str], grid: Path, options: tuple[str, ...], words: str
+def test_rejections(
+    rejects: Callable[..., str], grid: Path, options: tuple[str, ...], words: str
 ) -> None:
     Path("half.csv").write_text("p2_1_s2,kr,lon\n3,0.1,20\n")
     Path("bad.csv").write_text("p2_1_s2,kr\n3,0\n")
@@ -212,7 +212,7 @@ def test_refusals(
     Path("bad.geojson").write_text(
         '{"type": "FeatureCollection", "features": [{"properties": {"p2_1_s2": 3, "kr": 0.1}}]}'
     )
-    assert words in refuses("shakemap", grid, *options)
+    assert words in rejects("shakemap", grid, *options)
     assert not Path("a.csv").exists()
 
 
@@ -251,7 +251,7 @@ def test_a_model_that_does_not_know_what_blocks_share(shell: Shell, grid: Path) 
 
 
 def test_free_standing_blocks_with_their_restitution(
-    shell: Shell, refuses: Refuses, grid: Path
+    shell: Shell, rejects: Rejects, grid: Path
 ) -> None:
     Path("b.csv").write_text("p2_1_s2,kr,lon,lat,restitution\n3,0.1,20,41,\n3,0.1,20,41,0.8\n")
     free = ("--kind", "rocking", "--db", REFERENCE, *SINGLE)
@@ -268,7 +268,7 @@ def test_free_standing_blocks_with_their_restitution(
     first = json.loads(Path("b.geojson").read_text())["features"][0]["properties"]
     assert first["probability"] == pytest.approx(float(rows[1]["probability"]), rel=1e-9)
     assert told["model"] == "rocking-pgv_pga"
-    message = refuses("shakemap", grid, *one, *SINGLE, "--kind", "toppling")
+    message = rejects("shakemap", grid, *one, *SINGLE, "--kind", "toppling")
     assert "--restitution cannot be combined with kind toppling" in message
 
 

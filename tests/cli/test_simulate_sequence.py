@@ -64,7 +64,7 @@ def test_the_table_is_printed_written_and_the_same_again(shell: Any, shocks: Pat
         (("--sequence", "--vertical", "with"), "--vertical cannot be combined with --sequence"),
     ],
 )
-def test_options_that_do_not_go_together_are_refused(
-    refuses: Any, shocks: Path, more: tuple[str, ...], message: str
+def test_options_that_do_not_go_together_are_rejected(
+    rejects: Any, shocks: Path, more: tuple[str, ...], message: str
 ) -> None:
-    assert message in refuses("simulate", *more, "--db", shocks)
+    assert message in rejects("simulate", *more, "--db", shocks)

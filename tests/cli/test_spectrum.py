@@ -9,7 +9,7 @@ import pytest
 
 from rbfrag.motions.readers import read_motions
 from rbfrag.motions.toppling_spectrum import toppling_spectrum
-from tests.cli.conftest import Refuses, Shell
+from tests.cli.conftest import Rejects, Shell
 from tests.synthetic import shaking, write_at2
 
 
@@ -80,10 +80,10 @@ def test_stored_motion(shell: Shell, record: Path) -> None:
     ],
 )
 def test_bad_values(
-    refuses: Refuses, record: Path, tmp_path: Path, options: tuple[str, str], words: str
+    rejects: Rejects, record: Path, tmp_path: Path, options: tuple[str, str], words: str
 ) -> None:
     before = sorted(tmp_path.iterdir())
-    assert words in refuses("spectrum", record, *options)
+    assert words in rejects("spectrum", record, *options)
     assert sorted(tmp_path.iterdir()) == before
 
 

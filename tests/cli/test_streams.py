@@ -26,12 +26,12 @@ def test_a_character_that_a_stream_cannot_write_is_replaced(encoding: str, writt
     )
     assert written in done.stdout.decode(encoding)
     assert done.stderr == b""
-    refused = subprocess.run(
+    rejected = subprocess.run(
         [*COMMAND, "0.6", "--p2", "-1"], capture_output=True, check=False,
         env={"PYTHONIOENCODING": encoding},
     )  # fmt: skip
-    assert refused.returncode == 2
-    assert refused.stderr.startswith(b"rbfrag: ")
+    assert rejected.returncode == 2
+    assert rejected.stderr.startswith(b"rbfrag: ")
 
 
 @pytest.mark.parametrize("more", [(), ("--json",)])

@@ -116,24 +116,24 @@ def test_branches_of_openquake(shell: Shell, curve: str, formats_dir: Path) -> N
         assert word in drawn
 
 
-def test_refusals_of_a_logic_tree(
-    refuses: Callable[..., str], curve: str, formats_dir: Path
+def test_rejections_of_a_logic_tree(
+    rejects: Callable[..., str], curve: str, formats_dir: Path
 ) -> None:
     tree = formats_dir / TREE
     branch, weights = tree / "hazard_curve-rlz-000-PGV_7.csv", tree / "realizations_7.csv"
     asked = (*BLOCK, "--age", "3000")
     at = ("--site", "SLIDE-A")
-    assert "choose it by number or name" in refuses("survival", branch, *asked)
-    assert "add up to 0.5, not 1" in refuses("survival", branch, *at, *asked, "--weights", weights)
-    assert "none of the curves is one" in refuses("survival", curve, *asked, "--weights", weights)
+    assert "choose it by number or name" in rejects("survival", branch, *asked)
+    assert "add up to 0.5, not 1" in rejects("survival", branch, *at, *asked, "--weights", weights)
+    assert "none of the curves is one" in rejects("survival", curve, *asked, "--weights", weights)
     Path("few.csv").write_text("rlz_id,branch_path,weight\n1,A~B,1.0\n")
-    message = refuses("survival", branch, *at, *asked, "--weights", "few.csv")
+    message = rejects("survival", branch, *at, *asked, "--weights", "few.csv")
     assert "there is no rlz_id 0" in message
     Path("none.csv").write_text("rlz_id,weight\n0,half\n")
-    message = refuses("survival", branch, *at, *asked, "--weights", "none.csv")
+    message = rejects("survival", branch, *at, *asked, "--weights", "none.csv")
     assert "is not a realization" in message
     other = tree / "hazard_curve-mean-PGA_7.csv"
-    assert "curves are of PGV, PGA" in refuses("survival", branch, other, *at, *asked)
+    assert "curves are of PGV, PGA" in rejects("survival", branch, other, *at, *asked)
 
 
 @pytest.mark.parametrize(
@@ -147,15 +147,15 @@ def test_refusals_of_a_logic_tree(
         (("--age", "100", "--plot", "plot.xls"), ".png"),
     ],
 )
-def test_refusals(
-    refuses: Callable[..., str], curve: str, options: tuple[str, ...], words: str
+def test_rejections(
+    rejects: Callable[..., str], curve: str, options: tuple[str, ...], words: str
 ) -> None:
-    assert words in refuses("survival", curve, *BLOCK, *options)
+    assert words in rejects("survival", curve, *BLOCK, *options)
 
 
-def test_a_sigma_below_zero_is_refused_by_name(refuses: Callable[..., str], curve: str) -> None:
+def test_a_sigma_below_zero_is_rejected_by_name(rejects: Callable[..., str], curve: str) -> None:
     Path("one.csv").write_text("block_id,p2_1_s2,kr,kr_sigma\nA7,3,0.1,-0.2\n")
-    message = refuses(
+    message = rejects(
         "survival", curve, "--blocks", "one.csv", "--kind", "toppling", "--age", "100"
     )
     assert "line 2 (block A7): kr_sigma = -0.2 is negative" in message

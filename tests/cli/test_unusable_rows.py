@@ -13,7 +13,7 @@ import pytest
 import rbfrag
 from rbfrag.db.engine import opened_database
 from rbfrag.db.models import save_model
-from tests.cli.conftest import Refuses, Shell
+from tests.cli.conftest import Rejects, Shell
 from tests.exchange.openquake_job import write_job
 from tests.exchange.test_shakemap_grid import GRID
 from tests.fragility.conftest import model_row
@@ -128,7 +128,7 @@ def test_losses_leave_a_bad_row_out(shell: Shell, kind: str) -> None:
 @pytest.mark.usefixtures("tables")
 @pytest.mark.parametrize("command", ["survival", "export"])
 def test_answers_that_need_every_row_name_all_that_are_bad(
-    shell: Shell, refuses: Refuses, command: str
+    shell: Shell, rejects: Rejects, command: str
 ) -> None:
     Path("b.csv").write_text(HEAD + SOUND["A"] + "".join(BAD.values()) + SOUND["C"])
     asked: dict[str, tuple[str, ...]] = {
@@ -144,7 +144,7 @@ def test_answers_that_need_every_row_name_all_that_are_bad(
         ),
         "export": ("export", "nrml", *UNUSED, "--out", "a.xml"),
     }
-    message = refuses(*asked[command], "--blocks", "b.csv")
+    message = rejects(*asked[command], "--blocks", "b.csv")
     assert "7 of 9 blocks are invalid" in message
     assert "line 3 (block B)" in message
     assert "correct or remove these rows" in message
@@ -154,7 +154,7 @@ def test_answers_that_need_every_row_name_all_that_are_bad(
 
 
 @pytest.mark.usefixtures("tables")
-def test_only_a_table_without_a_block_is_refused(shell: Shell, refuses: Refuses) -> None:
+def test_only_a_table_without_a_block_is_rejected(shell: Shell, rejects: Rejects) -> None:
     Path("b.csv").write_text(HEAD + "".join(BAD.values()))
     for asked in (
         ("predict", "--batch", "b.csv", "--out", "o.csv", *UNUSED),
@@ -162,7 +162,7 @@ def test_only_a_table_without_a_block_is_refused(shell: Shell, refuses: Refuses)
         ("shakemap", "grid.xml", "--blocks", "b.csv", "--out", "o.csv"),
         ("losses", "job", "--blocks", "b.csv"),
     ):
-        message = refuses(*asked)
+        message = rejects(*asked)
         assert "b.csv: none of 7 blocks is valid, the first 6: line 2" in message
         assert not Path("o.csv").exists()
 
@@ -247,7 +247,7 @@ def test_arrays_in_python_are_answered_as_tables() -> None:
 
 @pytest.mark.usefixtures("tables")
 def test_blocks_of_sites_without_a_curve_have_their_reason(
-    shell: Shell, refuses: Refuses, formats_dir: Path
+    shell: Shell, rejects: Rejects, formats_dir: Path
 ) -> None:
     curve = (
         formats_dir
@@ -263,7 +263,7 @@ def test_blocks_of_sites_without_a_curve_have_their_reason(
     only = shell.json("hazard", curve, "--blocks", "b.csv", *SINGLE, "--site", "0012")
     assert [row["block_id"] for row in only["blocks"]] == ["C", "D"]
     Path("b.csv").write_text(head + "B,10,0.2,12\n")
-    assert "stands at site '12'" in refuses("hazard", curve, "--blocks", "b.csv")
+    assert "stands at site '12'" in rejects("hazard", curve, "--blocks", "b.csv")
 
 
 def test_a_chart_shows_the_blocks_that_it_can(shell: Shell) -> None:

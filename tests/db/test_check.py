@@ -210,7 +210,7 @@ def test_an_altered_value_is_found(
             try:
                 connection.execute(update(altered).where(same_row).values({column: value}))
             except IntegrityError:
-                pass  # the schema refuses it
+                pass  # the schema rejects it
             else:
                 found = list(check_digests(connection))
                 assert [each.table for each in found] == [table], column.name

@@ -86,7 +86,7 @@ class TestLocation:
             "postgresql://h:port/n",
         ],
     )
-    def test_refused(self, given: str) -> None:
+    def test_rejected(self, given: str) -> None:
         with pytest.raises(InputError, match="import-a-table" if "mysql" in given else None):
             sqlalchemy_url(locate(given))
 
@@ -152,10 +152,10 @@ class TestCreation:
         assert [file.name for file in tmp_path.iterdir()] == ["x.db"]
 
     def test_without_hard_links(self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-        def refuse(self: Path, target: Path) -> None:
+        def reject(self: Path, target: Path) -> None:
             raise OSError("no links here")
 
-        monkeypatch.setattr(Path, "hardlink_to", refuse)
+        monkeypatch.setattr(Path, "hardlink_to", reject)
         with opened_database(tmp_path / "x.db", create=True) as engine:
             assert _count(engine) == 0
         assert [file.name for file in tmp_path.iterdir()] == ["x.db"]
@@ -316,7 +316,7 @@ class TestRefusals:
 
 
 class TestReadOnly:
-    def test_writes_are_refused(self, place: str) -> None:
+    def test_writes_are_rejected(self, place: str) -> None:
         open_database(place, create=True).dispose()
         with (
             opened_database(place, read_only=True) as engine,
@@ -384,7 +384,7 @@ def test_settings_of_a_writing_connection(sqlite_file: Path) -> None:
     assert pragma == {"journal_mode": "wal", "foreign_keys": 1, "synchronous": 2}
 
 
-def test_a_database_of_two_schemas_is_refused(place: str) -> None:
+def test_a_database_of_two_schemas_is_rejected(place: str) -> None:
     with opened_database(place, create=True) as engine, engine.begin() as connection:
         connection.execute(text(f"ALTER TABLE {VERSION_TABLE} RENAME TO once"))
         connection.execute(text(f"CREATE TABLE {VERSION_TABLE} (version_num VARCHAR(32))"))

@@ -176,7 +176,7 @@ def test_unknown_events_are_not_one_event(engine: Engine, make_motion: MakeMotio
     assert events[0] == events[1] != events[2]
 
 
-def test_stated_events_that_differ_are_refused(engine: Engine, make_motion: MakeMotion) -> None:
+def test_stated_events_that_differ_are_rejected(engine: Engine, make_motion: MakeMotion) -> None:
     with engine.begin() as connection:
         add_motion(connection, make_motion(), earthquake=STATED, is_vertical=False)
         other = replace(STATED, event_id="darfield-2010")
@@ -213,7 +213,7 @@ def test_suites(engine: Engine, make_motion: MakeMotion) -> None:
 
 
 @pytest.mark.parametrize("motion_id", [7, 0, -1, 2**31, 10**30])
-def test_an_unknown_id_is_refused(engine: Engine, motion_id: int) -> None:
+def test_an_unknown_id_is_rejected(engine: Engine, motion_id: int) -> None:
     with engine.connect() as connection:
         with pytest.raises(InputError, match=f"unknown motion {motion_id}:"):
             load_motion(connection, motion_id)
@@ -233,7 +233,7 @@ def test_names_that_are_no_text_are_stored_visibly(engine: Engine, make_motion: 
 
 
 @pytest.mark.parametrize("magnitude", [62.0, float("nan"), float("inf")])
-def test_impossible_magnitudes_are_refused(
+def test_impossible_magnitudes_are_rejected(
     engine: Engine, make_motion: MakeMotion, magnitude: float
 ) -> None:
     quake = replace(STATED, magnitude=magnitude)
@@ -244,7 +244,7 @@ def test_impossible_magnitudes_are_refused(
         add_motion(connection, make_motion(), earthquake=quake, is_vertical=False)
 
 
-def test_samples_beyond_all_accelerations_are_refused(engine: Engine) -> None:
+def test_samples_beyond_all_accelerations_are_rejected(engine: Engine) -> None:
     motion = GroundMotion(np.array([0.0, 1e308, 1e308, 0.0]), 10.0)
     with (
         engine.begin() as connection,
@@ -254,14 +254,14 @@ def test_samples_beyond_all_accelerations_are_refused(engine: Engine) -> None:
         add_motion(connection, motion, earthquake=GUESS, is_vertical=False)
 
 
-def test_nodes_are_refused(engine: Engine) -> None:
+def test_nodes_are_rejected(engine: Engine) -> None:
     motion = GroundMotion.from_nodes([0.0, 0.0, 1.0], [0.0, 1.0, 1.0])
     with engine.begin() as connection, pytest.raises(InputError, match="equally spaced"):
         add_motion(connection, motion, earthquake=GUESS, is_vertical=False)
 
 
 @pytest.mark.parametrize("samples", [b"", b"\x00" * 512])
-def test_tampered_samples_are_refused(
+def test_tampered_samples_are_rejected(
     engine: Engine, make_motion: MakeMotion, samples: bytes
 ) -> None:
     with engine.begin() as connection:

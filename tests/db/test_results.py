@@ -89,7 +89,7 @@ class TestNaturalKey:
         assert (len(keys) == 1) == (a == b)
 
     @pytest.mark.parametrize("value", [float("nan"), float("inf"), object()])
-    def test_refuses_what_equals_nothing(self, value: object) -> None:
+    def test_rejects_what_equals_nothing(self, value: object) -> None:
         with pytest.raises(InputError):
             combination_key(**{**KEY, "settings": {"x": value}})
 
@@ -144,7 +144,7 @@ def test_campaigns_say_whether_they_finished(engine: Engine) -> None:
         {"y_m_s": -1.0},
     ],
 )
-def test_the_schema_refuses_nonsense(
+def test_the_schema_rejects_nonsense(
     engine: Engine, make_motion: Any, make_result: Any, store_result: Any, change: dict[str, Any]
 ) -> None:
     motion = make_motion()

@@ -141,7 +141,7 @@ class TestFrames:
         assert none["kr"].shape == (0,)
         assert none["kr"].dtype == np.float64
 
-    def test_unknown_names_are_refused_with_those_there_are(self, filled: Engine) -> None:
+    def test_unknown_names_are_rejected_with_those_there_are(self, filled: Engine) -> None:
         with pytest.raises(InputError, match="unknown table 'motions'; the tables are earthquake"):
             read_table("motions", db=url(filled))
         with pytest.raises(InputError, match="no column 'pga'; it has: id, recording_id"):

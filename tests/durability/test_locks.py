@@ -19,14 +19,14 @@ from sqlalchemy import make_url, text
 from benchmarks.database_content import content_digest
 from benchmarks.durability import campaign, digest, environment, stored
 from rbfrag.campaign.simulate import CampaignProgress, simulate
-from rbfrag.db import patience
+from rbfrag.db import connection_watchdog
 from rbfrag.db.engine import opened_database
 from rbfrag.db.merge.databases import merge_databases
 from rbfrag.errors import DatabaseBusyError, DatabaseFailedError
-from tests.cli.conftest import Refuses, Shell, refuses, shell
+from tests.cli.conftest import Rejects, Shell, rejects, shell
 from tests.durability.conftest import P2
 
-__all__ = ["refuses", "shell"]
+__all__ = ["rejects", "shell"]
 
 
 @pytest.fixture
@@ -35,7 +35,7 @@ def impatient(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_a_locked_database(
-    database: Path, impatient: None, shell: Shell, refuses: Refuses, untouched: bytes
+    database: Path, impatient: None, shell: Shell, rejects: Rejects, untouched: bytes
 ) -> None:
     other = sqlite3.connect(database, isolation_level=None)
     other.execute("BEGIN IMMEDIATE")
@@ -45,7 +45,7 @@ def test_a_locked_database(
             ("simulate", "--jobs", "1", "--db", database),
             ("db", "merge", "b.db", "--db", database),
         ):
-            message = refuses(*words, status=1)
+            message = rejects(*words, status=1)
             assert "is locked by another process; what was finished is kept" in message
         # readers go on
         assert shell.json("db", "info", "--db", database)["rows"]["combination"] == 0
@@ -189,7 +189,7 @@ def test_what_another_campaign_stores_meanwhile_stays_its_own(
 
 
 class TestUnusable:
-    def test_no_server(self, refuses: Refuses) -> None:
+    def test_no_server(self, rejects: Rejects) -> None:
         pytest.importorskip("psycopg")
         for words in (
             ("simulate",),
@@ -201,11 +201,11 @@ class TestUnusable:
             if words[:2] == ("db", "merge"):
                 with opened_database("x.db", create=True):
                     pass
-            message = refuses(*words, "--db", "postgresql://nobody:secret@127.0.0.1:1/none")
+            message = rejects(*words, "--db", "postgresql://nobody:secret@127.0.0.1:1/none")
             assert "cannot reach postgresql://nobody:***@127.0.0.1:1/none" in message
             assert "secret" not in message
 
-    def test_a_schema_from_the_future(self, database: Path, refuses: Refuses) -> None:
+    def test_a_schema_from_the_future(self, database: Path, rejects: Rejects) -> None:
         raw = sqlite3.connect(database)
         raw.execute("UPDATE rbfrag_revision SET version_num = '9999'")
         raw.commit()
@@ -215,16 +215,16 @@ class TestUnusable:
             ("simulate",), ("motions", "list"), ("db", "check"), ("db", "upgrade"),
             ("db", "export", "--out", "out"), ("fit", "--term", "pgv"),
         ):  # fmt: skip
-            message = refuses(*words, "--db", database)
+            message = rejects(*words, "--db", database)
             assert "schema 9999, newer than" in message
             assert "install a newer rbfrag" in message
-        assert "install a newer rbfrag" in refuses("db", "merge", database, "--db", "new.db")
+        assert "install a newer rbfrag" in rejects("db", "merge", database, "--db", "new.db")
         assert not Path("new.db").exists()
         assert database.read_bytes() == before
 
     @pytest.mark.skipif(os.name == "nt", reason="rights of POSIX")
     def test_a_read_only_file(
-        self, database: Path, shell: Shell, refuses: Refuses, tmp_path: Path
+        self, database: Path, shell: Shell, rejects: Rejects, tmp_path: Path
     ) -> None:
         was_root = os.geteuid() == 0
         database.chmod(0o444)
@@ -240,7 +240,7 @@ class TestUnusable:
         if was_root:
             os.seteuid(65534)
         try:
-            assert "cannot be written" in refuses("simulate", "--jobs", "1", "--db", database)
+            assert "cannot be written" in rejects("simulate", "--jobs", "1", "--db", database)
             assert shell.json("db", "check", "--db", database)["sound"]
         finally:
             if was_root:
@@ -283,9 +283,9 @@ def test_a_server_that_falls_silent_is_given_up(
     on_server: str, undisturbed: str, monkeypatch: pytest.MonkeyPatch,
     caplog: pytest.LogCaptureFixture,
 ) -> None:  # fmt: skip
-    monkeypatch.setattr(patience, "WARNED_S", 0.5)
-    monkeypatch.setattr(patience, "ENDED_S", 1.5)
-    monkeypatch.setattr(patience, "PROBE_S", 2)
+    monkeypatch.setattr(connection_watchdog, "WARNED_S", 0.5)
+    monkeypatch.setattr(connection_watchdog, "ENDED_S", 1.5)
+    monkeypatch.setattr(connection_watchdog, "PROBE_S", 2)
     url = make_url(on_server)
     with stalling_proxy(url.port or 5432) as (port, stalls):
         by_proxy = url.set(host="127.0.0.1", port=port).render_as_string(hide_password=False)
@@ -303,7 +303,7 @@ def test_a_server_that_falls_silent_is_given_up(
 
 
 def test_a_statement_may_take_its_time(on_server: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(patience, "WARNED_S", 0.3)
-    monkeypatch.setattr(patience, "ENDED_S", 0.6)
+    monkeypatch.setattr(connection_watchdog, "WARNED_S", 0.3)
+    monkeypatch.setattr(connection_watchdog, "ENDED_S", 0.6)
     with opened_database(on_server) as engine, engine.connect() as connection:
         assert connection.scalar(text("SELECT 1 FROM pg_sleep(2)")) == 1

@@ -55,7 +55,7 @@ def undisturbed(motions: Path, tmp_path_factory: pytest.TempPathFactory) -> str:
 def server() -> Iterator[Server]:
     """URL of a server of this test alone, and what stops or starts it."""
     pytest.importorskip("psycopg")
-    # PostgreSQL refuses to run as root, and its user enters no folder of root's
+    # PostgreSQL rejects to run as root, and its user enters no folder of root's
     user = "postgres" if os.geteuid() == 0 else None
     folder = tempfile.mkdtemp(prefix="rbfrag-server-")
     if user is not None:

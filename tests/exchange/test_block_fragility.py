@@ -167,10 +167,10 @@ def test_a_block_that_credible_shaking_does_not_fail_has_none() -> None:
         block_functions(["a"], {"p2": np.array([3.0]), "kr": np.array([0.1])}, "pgv_m_s", levels=9)
 
 
-def test_names_that_a_tool_refuses_are_written_otherwise() -> None:
+def test_names_that_a_tool_rejects_are_written_otherwise() -> None:
     kind = functions_of(pga_model(), "pga_g")[0].kind
     functions = [FragilityFunction(name, "toppled", kind) for name in ("a#1", "b", "c'd\"")]
-    named, (warning,) = renamed(functions, "#'\"", "_", "the engine refuses")
+    named, (warning,) = renamed(functions, "#'\"", "_", "the engine rejects")
     assert [each.name for each in named] == ["a_1", "b", "c_d_"]
     assert "2 of 3 IDs" in warning
     assert "'a#1' is written as 'a_1'" in warning

@@ -19,7 +19,7 @@ from rbfrag.exchange.block_draws import read_draws
 from rbfrag.exchange.block_rows import BlockRows, read_blocks
 from rbfrag.exchange.table_answers import predict_table
 from rbfrag.exchange.tables.files import write_block_table
-from rbfrag.fragility.unusable import in_list, unusable_in_words
+from rbfrag.fragility.invalid_rows import describe_invalid, in_list
 from tests.block_tables import read_columns
 
 NAMES = ("block_id", "p2_1_s2", "kr", "mode", "weight", "lon", "lat")
@@ -105,9 +105,9 @@ def test_bad_rows_leave_the_others_as_they_are(
             read_blocks(source)
         return
     found = read_blocks(source)
-    assert found.refused["row"].tolist() == bad
+    assert found.rejected["row"].tolist() == bad
     assert found.blocks["row"].tolist() == [i for i in range(len(rows)) if i not in bad]
-    for i, reason, place in zip(bad, found.refused["reason"], found.row_labels, strict=True):
+    for i, reason, place in zip(bad, found.rejected["reason"], found.row_labels, strict=True):
         expected = BAD[kinds[i]][1]
         if form == "geojson" and kinds[i] == "no place":  # a point has both, or none
             expected = "lon = nan, lat = nan is no place"
@@ -115,19 +115,19 @@ def test_bad_rows_leave_the_others_as_they_are(
         number = FIRST.get(form, 1) + i
         assert place == f"{WORDS.get(form, 'row')} {number} (block b{i})"
     assert (found.blocks["kr"] == 0.1).all()
-    again = found.with_refused({"block_id": found.blocks["block_id"], "p": found.blocks["kr"]})
+    again = found.with_rejected({"block_id": found.blocks["block_id"], "p": found.blocks["kr"]})
     assert again["block_id"].tolist() == [row[0] for row in rows]
     assert np.flatnonzero(np.isnan(again["p"]) | (again["p"] != 0.1)).tolist() == bad
-    said = found.unusable_in_words()
+    said = found.describe_invalid()
     assert len(said) == bool(bad)
     if bad:
         assert said[0].startswith(
             f"{len(bad)} of {len(rows)} blocks could not be used; the reasons"
         )
         assert f"(block b{bad[0]}): " in said[0]
-        with pytest.raises(InputError) as refusal:
+        with pytest.raises(InputError) as rejection:
             found.require_all("all are asked about")
-        message = str(refusal.value)
+        message = str(rejection.value)
         assert f"{len(bad)} of {len(rows)} blocks are invalid, and all are asked" in message
         assert len(message) < 500
 
@@ -179,7 +179,7 @@ def test_delimiters_behind_the_last_column_are_no_column(tmp_path: Path) -> None
     source.write_text("block_id;p2_1_s2;kr;;\na;3;0,1;;\nb;3;0,2;;\nc;3;0,2;;x\n;;;;\n")
     rows = read_blocks(source)
     assert rows.blocks["block_id"].tolist() == ["a", "b"]
-    assert rows.refused["reason"].tolist() == ["5 cells under 3 columns"]
+    assert rows.rejected["reason"].tolist() == ["5 cells under 3 columns"]
     told = predict_table(
         source, tmp_path / "b.csv", inputs={"pgv_m_s": 0.6}, model=None, level=0.95, db=None
     )
@@ -189,22 +189,22 @@ def test_delimiters_behind_the_last_column_are_no_column(tmp_path: Path) -> None
 def test_what_a_command_does_not_read_is_no_concern_of_it() -> None:
     columns = {"p2_1_s2": [3.0, 3.0], "kr": [0.1, 0.1], "loss": ["much", 5.0], "lon": [999.0, 1.0],
                "lat": [0.0, 0.0]}  # fmt: skip
-    assert read_blocks(columns).refused["row"].tolist() == [0]
-    assert read_blocks(columns, reads=("lon", "lat")).refused["row"].tolist() == [0]
-    assert read_blocks(columns, reads=("loss",)).refused["row"].tolist() == [0]
-    assert read_blocks(columns, reads=()).refused_count == 0
+    assert read_blocks(columns).rejected["row"].tolist() == [0]
+    assert read_blocks(columns, reads=("lon", "lat")).rejected["row"].tolist() == [0]
+    assert read_blocks(columns, reads=("loss",)).rejected["row"].tolist() == [0]
+    assert read_blocks(columns, reads=()).rejected_count == 0
 
 
-def test_rectangles_are_refused_in_their_own_words() -> None:
+def test_rectangles_are_rejected_in_their_own_words() -> None:
     columns = {"height_m": [2.0, None, -1.0, 2.0], "width_m": [0.5, 0.5, 0.5, "?"],
                "dip_deg": [95.0, 0.0, 0.0, 0.0]}  # fmt: skip
-    with pytest.raises(InputError) as refusal:
+    with pytest.raises(InputError) as rejection:
         read_blocks(columns)
     for words in (
         "row 1: dip_deg must be between -90° and 90°, not 95", "row 2: height_m is empty",
         "row 3: height_m must be above 0 m, not -1", "row 4: width_m = '?' is not a number",
     ):  # fmt: skip
-        assert words in str(refusal.value)
+        assert words in str(rejection.value)
 
 
 def test_kinds_of_rows() -> None:
@@ -216,7 +216,7 @@ def test_kinds_of_rows() -> None:
     own: BlockRows = read_blocks(columns)
     assert own.blocks["row"].tolist() == [0, 3, 4]
     assert own.blocks["kind"].tolist() == ["toppling", "rocking", "toppling"]
-    rocking, sliding = own.refused["reason"].tolist()
+    rocking, sliding = own.rejected["reason"].tolist()
     assert rocking.startswith("restitution = 1.2 must be above 0 and up to 1")
     assert sliding == (
         "the block's mode is slide, and ky is missing: a block of kind sliding is given by ky and "
@@ -228,7 +228,7 @@ def test_kinds_of_rows() -> None:
             read_blocks(wrong)
     columns["restitution"][1] = 0.9
     one = read_blocks(columns, one_kind=True)
-    assert one.refused["reason"][0] == (
+    assert one.rejected["reason"][0] == (
         "the block's kind is rocking, and the answer is for kind toppling"
     )
     with pytest.raises(InputError, match="unknown kind 'rolling'"):
@@ -246,7 +246,7 @@ def test_kinds_of_rows() -> None:
         (3, "blocks is of type int"),
     ],
 )
-def test_tables_that_are_refused_as_a_whole(columns: Any, words: str) -> None:
+def test_tables_that_are_rejected_as_a_whole(columns: Any, words: str) -> None:
     with pytest.raises(InputError, match=words):
         read_blocks(columns)
 
@@ -266,15 +266,15 @@ def test_cells_of_pandas() -> None:
     )
     rows = read_blocks(frame)
     assert rows.blocks["row"].tolist() == [0]
-    assert rows.refused["reason"][0].startswith("p2 is not a number")
+    assert rows.rejected["reason"][0].startswith("p2 is not a number")
 
 
-def test_columns_that_must_be_whole_are_refused_with_all_their_lines(tmp_path: Path) -> None:
+def test_columns_that_must_be_whole_are_rejected_with_all_their_lines(tmp_path: Path) -> None:
     path = tmp_path / "a.csv"
     path.write_text("kr,p2\n0.1,3\nx,3\n0.1\n?,3\n")
-    with pytest.raises(InputError) as refusal:
+    with pytest.raises(InputError) as rejection:
         read_draws(path)
-    assert str(refusal.value) == (
+    assert str(rejection.value) == (
         f"{path}, line 3: kr = 'x' is not a number; line 4: 1 cells under 2 columns; "
         "line 5: kr = '?' is not a number"
     )
@@ -295,12 +295,12 @@ def test_a_long_list_has_room_in_a_message() -> None:
     assert text.startswith(f"{places[0]}, {places[2]}")
     assert "and 2,494 more: p2 is empty" in text
     assert text.endswith("; and 2,500 more")
-    with pytest.raises(InputError) as refusal:
+    with pytest.raises(InputError) as rejection:
         read_blocks(
             {"p2_1_s2": np.full(5000, 3.0), "kr": np.append(0.1, np.full(4999, -1.0))}
         ).require_all("all are asked about")
-    message = str(refusal.value)
+    message = str(rejection.value)
     assert "4,999 of 5,000 blocks" in message
     assert message.endswith("correct or remove these rows")
     assert "…" not in message
-    assert unusable_in_words(0, 5, [], []) == ()
+    assert describe_invalid(0, 5, [], []) == ()

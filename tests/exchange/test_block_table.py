@@ -168,7 +168,7 @@ def test_rectangles_of_a_free_standing_kind(tmp_path: Path) -> None:
     assert read_blocks(path, "rocking").require_all()["kr"][0] == pytest.approx(free)
 
 
-def test_text_of_another_encoding_is_refused_with_its_row(tmp_path: Path) -> None:
+def test_text_of_another_encoding_is_rejected_with_its_row(tmp_path: Path) -> None:
     import pyarrow as pa
     import pyarrow.parquet as pq
 

@@ -168,7 +168,7 @@ def test_fits_read_own_results_before_imported_ones(
         ({}, 'p2 = "p2"', 'p2 = { column = "reverse_side" }', "line .: p2 is '0'"),
     ],
 )  # fmt: skip
-def test_what_cannot_be_is_refused_with_its_line(
+def test_what_cannot_be_is_rejected_with_its_line(
     bring: Callable[..., MergeReport], cells: dict[str, object], old: str, new: str, message: str,
     tmp_path: Path,
 ) -> None:  # fmt: skip

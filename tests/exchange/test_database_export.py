@@ -20,10 +20,10 @@ from rbfrag.db import schema
 from rbfrag.db.engine import opened_database
 from rbfrag.errors import InputError, WorkFailedError
 from rbfrag.exchange.database_tables import export_database
-from tests.cli.conftest import Refuses, Shell, refuses, shell
+from tests.cli.conftest import Rejects, Shell, rejects, shell
 from tests.synthetic import shaking, write_suite
 
-__all__ = ["refuses", "shell"]
+__all__ = ["rejects", "shell"]
 
 
 @pytest.fixture(scope="module")
@@ -152,7 +152,7 @@ def test_a_full_disk_leaves_nothing(
     assert list(tmp_path.iterdir()) == []
 
 
-def test_refusals(database: Path, tmp_path: Path) -> None:
+def test_rejections(database: Path, tmp_path: Path) -> None:
     (tmp_path / "full").mkdir()
     (tmp_path / "full" / "mine.txt").touch()
     for out, options, message in (
@@ -169,11 +169,11 @@ def test_refusals(database: Path, tmp_path: Path) -> None:
     assert [path.name for path in tmp_path.iterdir()] == ["full"]
 
 
-def test_the_command_line(database: Path, shell: Shell, refuses: Refuses) -> None:
+def test_the_command_line(database: Path, shell: Shell, rejects: Rejects) -> None:
     words = ("db", "export", "--db", database, "--out", "out")
     answer = shell.json(*words, "--tables", "motion, suite")
     assert answer == {
         "folder": "out", "format": "parquet", "rows": {"motion": 2, "suite": 1}, "warnings": []
     }  # fmt: skip
-    assert "the folder is not empty" in refuses(*words)
-    assert "no database" in refuses("db", "export", "--out", "out2")
+    assert "the folder is not empty" in rejects(*words)
+    assert "no database" in rejects("db", "export", "--out", "out2")

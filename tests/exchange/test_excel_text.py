@@ -71,7 +71,7 @@ def test_answers_of_a_table(tmp_path: Path, excel_text: bool) -> None:
 
 
 def test_every_writer_of_csv_has_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Of the database, of a rock mass, of a spectrum; refused where it would do nothing."""
+    """Of the database, of a rock mass, of a spectrum; rejected where it would do nothing."""
     monkeypatch.chdir(tmp_path)
     shell = Shell()
     record = write_at2(tmp_path / "=1+1.AT2", shaking(3), station="=1+1")

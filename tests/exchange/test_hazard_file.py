@@ -138,7 +138,7 @@ def test_two_columns_as_people_write_them(
         ('{"Arias": {"xs": [0.0, 1.0], "ys": [1, 0]}}', "measure 'Arias' is unknown"),
     ],
 )  # fmt: skip
-def test_bad_curves_are_refused(tmp_path: Path, text: str, words: str) -> None:
+def test_bad_curves_are_rejected(tmp_path: Path, text: str, words: str) -> None:
     path = tmp_path / "curve.csv"
     path.write_text(text)
     with pytest.raises(InputError, match=words):
@@ -171,7 +171,7 @@ def test_maps_and_spectra_are_no_curves(tmp_path: Path, columns: str, what: str)
         read_hazard_curves(path)
 
 
-def test_arrays_of_curves_are_refused(tmp_path: Path) -> None:
+def test_arrays_of_curves_are_rejected(tmp_path: Path) -> None:
     path = tmp_path / "hcurves_4.npz"
     np.savez(path, investigation_time=50.0)
     with pytest.raises(InputError, match=r"oq export hcurves CALC_ID -e csv"):

@@ -189,7 +189,7 @@ def test_small_holes_are_closed_and_said(tmp_path: Path) -> None:
         assert f"closed with {triangles} triangles" in text
 
 
-def test_large_holes_are_refused(tmp_path: Path) -> None:
+def test_large_holes_are_rejected(tmp_path: Path) -> None:
     vertices, faces = EGG
     open_below = faces[(faces != 0).all(axis=1)]  # without the flat base
     with pytest.raises(InputError, match="not closed: 24 edges have a face on one side only"):
@@ -218,7 +218,7 @@ def test_faces_there_twice_or_without_area_and_loose_vertices(tmp_path: Path) ->
     assert block.warnings == ("1 faces were there twice and count once",)
 
 
-def test_two_bodies_and_a_surface_without_inside_are_refused(tmp_path: Path) -> None:
+def test_two_bodies_and_a_surface_without_inside_are_rejected(tmp_path: Path) -> None:
     vertices, faces = BOX
     both = np.vstack([vertices, vertices + 2.0]), np.vstack([faces, faces + len(vertices)])
     with pytest.raises(InputError, match="2 separate closed surfaces"):
@@ -351,7 +351,7 @@ WHOLE = {
 @pytest.mark.parametrize("suffix", list(WHOLE))
 @settings(max_examples=60, suppress_health_check=[HealthCheck.too_slow])
 @given(data=st.data())
-def test_damaged_files_are_refused_or_answered(
+def test_damaged_files_are_rejected_or_answered(
     suffix: str, data: st.DataObject, tmp_path_factory: pytest.TempPathFactory
 ) -> None:
     content = bytearray(WHOLE[suffix])

@@ -124,7 +124,7 @@ WHOLE = """<?xml version="1.0"?>
          "document type definition, which is not supported"),
     ],
 )  # fmt: skip
-def test_bad_files_are_refused(tmp_path: Path, old: str, new: str, words: str) -> None:
+def test_bad_files_are_rejected(tmp_path: Path, old: str, new: str, words: str) -> None:
     assert old in WHOLE
     path = tmp_path / "a.xml"
     path.write_text(WHOLE.replace(old, new))
@@ -141,7 +141,7 @@ def test_an_entity_bomb_does_not_go_off(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("text", ["", "<nrml/>", "no xml"])
-def test_empty_files_are_refused(tmp_path: Path, text: str) -> None:
+def test_empty_files_are_rejected(tmp_path: Path, text: str) -> None:
     path = tmp_path / "a.xml"
     path.write_text(text)
     with pytest.raises(InputError, match=r"empty|no fragility function|not well-formed"):

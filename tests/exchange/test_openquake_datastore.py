@@ -107,7 +107,9 @@ def _one_site_unknown(file: Any) -> None:
         (_one_site_unknown, "gmf_data, row 1: the site '9' is not in calc_5.hdf5"),
     ],
 )
-def test_refusals_name_the_row(tmp_path: Path, changed: Callable[[Any], None], words: str) -> None:
+def test_rejections_name_the_row(
+    tmp_path: Path, changed: Callable[[Any], None], words: str
+) -> None:
     store = write_datastore(tmp_path / "calc_5.hdf5", changed=changed)
     with pytest.raises(InputError, match=words):
         read_events(JobFiles.of(store))

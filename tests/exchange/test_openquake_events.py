@@ -157,14 +157,14 @@ def test_years_beyond_the_stated_time_are_warned_of(tmp_path: Path) -> None:
         ("ruptures", "path=2", "path=2.5", r"rupt.*path = 2\.5 is not a whole number"),
     ],
 )  # fmt: skip
-def test_refusals_name_the_line(
+def test_rejections_name_the_line(
     tmp_path: Path, name: str, old: str, new: str, message: str
 ) -> None:
     folder = write_job(tmp_path)
     replace_text(folder, name, old, new)
-    with pytest.raises(InputError, match=message) as refused:
+    with pytest.raises(InputError, match=message) as rejected:
         read(folder)
-    assert len(str(refused.value)) < 500 + len(str(tmp_path))
+    assert len(str(rejected.value)) < 500 + len(str(tmp_path))
 
 
 def test_files_of_a_folder_and_by_name(tmp_path: Path) -> None:

@@ -114,7 +114,7 @@ HEAD = (
         (HEAD + 'a,0,Peak Ground Velocity,mps,0,0,multilinear_CDF,"2,1|0,1",,\n', "must increase"),
     ],
 )
-def test_bad_tables_are_refused(tmp_path: Path, text: str, words: str) -> None:
+def test_bad_tables_are_rejected(tmp_path: Path, text: str, words: str) -> None:
     path = tmp_path / "a.csv"
     path.write_text(text)
     with pytest.raises(InputError, match=words.replace("|", r"\|")):

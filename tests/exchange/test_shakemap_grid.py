@@ -120,7 +120,7 @@ def test_between_the_nodes(grid_file: Path) -> None:
         ('nlon="3"', 'nlon="x"', "nlon = 'x' is not a number"),
     ],
 )
-def test_bad_grids_are_refused(grid_file: Path, old: str, new: str, words: str) -> None:
+def test_bad_grids_are_rejected(grid_file: Path, old: str, new: str, words: str) -> None:
     assert old in GRID
     grid_file.write_text(GRID.replace(old, new))
     with pytest.raises(InputError, match=words):
@@ -167,7 +167,7 @@ def test_deviations_of_spectral_accelerations(tmp_path: Path, grid_file: Path) -
 
 
 @pytest.mark.parametrize("name", ["shake_result.hdf", "SHAKE.HDF5"])
-def test_hdf5_is_refused_with_what_to_take_instead(tmp_path: Path, name: str) -> None:
+def test_hdf5_is_rejected_with_what_to_take_instead(tmp_path: Path, name: str) -> None:
     path = tmp_path / name
     path.write_bytes(b"\x89HDF\r\n\x1a\n")
     with pytest.raises(InputError, match=r"is HDF5 .*: use grid\.xml"):

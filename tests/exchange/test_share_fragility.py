@@ -69,7 +69,7 @@ def test_blocks_that_share_nothing_are_counted_by_the_binomial_law() -> None:
 
 
 @pytest.mark.parametrize("shares", [[], [0.0], [10.0, 5.0], [101.0], [5.0, 5.0]])
-def test_shares_that_are_refused(model: FragilityModel, shares: list[float]) -> None:
+def test_shares_that_are_rejected(model: FragilityModel, shares: list[float]) -> None:
     with pytest.raises(InputError, match="increasing percentages"):
         of(model, [3.0], [0.1], shares)
 

@@ -198,7 +198,7 @@ def test_old_answers_are_replaced(answer: Answer, tmp_path: Path) -> None:
         ("", "no column p2_1_s2, nor height_m and width_m; the columns are none"),
     ],
 )
-def test_bad_tables_are_refused(answer: Answer, tmp_path: Path, text: str, words: str) -> None:
+def test_bad_tables_are_rejected(answer: Answer, tmp_path: Path, text: str, words: str) -> None:
     source, target = tmp_path / "a.csv", tmp_path / "b.csv"
     source.write_text(text)
     with pytest.raises(InputError, match=words):
@@ -289,7 +289,7 @@ def test_uncertain_blocks_are_integrated_over(answer: Answer, tmp_path: Path) ->
     source, target = tmp_path / "a.csv", tmp_path / "b.csv"
     source.write_text(f"{HEAD},kr_sigma\na,3,0.1,0.6,0.2\nb,3,0.1,0.6,\nc,3,0.1,0.6,-1\n")
     answer(source, target)
-    uncertain, certain, refused = rows_of(target)
+    uncertain, certain, rejected = rows_of(target)
     db = str(tmp_path / "model.db")
     expected = predict(3.0, 0.1, pgv_m_s=0.6, kr_sigma=0.2, db=db)
     for name in ("probability", "ci_low", "ci_high", "block_sd"):
@@ -297,7 +297,7 @@ def test_uncertain_blocks_are_integrated_over(answer: Answer, tmp_path: Path) ->
     by_itself = predict(3.0, 0.1, pgv_m_s=0.6, db=db)
     assert float(certain["probability"]) == pytest.approx(by_itself.probability, rel=1e-9)
     assert float(certain["block_sd"]) == pytest.approx(0.0, abs=1e-7)
-    assert refused["probability"] == refused["block_sd"] == ""
-    assert "kr_sigma is negative" in refused["reason"]
+    assert rejected["probability"] == rejected["block_sd"] == ""
+    assert "kr_sigma is negative" in rejected["reason"]
     answer(target, tmp_path / "again.csv", p2_sigma=0.1)  # the answers give way to new ones
     assert [*rows_of(tmp_path / "again.csv")[0]].count("block_sd") == 1

@@ -183,7 +183,7 @@ def test_one_bad_row_of_many(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     "content", [b"", b"PK\x03\x04 no archive", b"p2_1_s2,kr\n3,0.1\n", b"\xd0\xcf\x11\xe0 old"]
 )
-def test_other_files_are_refused_in_one_sentence(tmp_path: Path, content: bytes) -> None:
+def test_other_files_are_rejected_in_one_sentence(tmp_path: Path, content: bytes) -> None:
     source = tmp_path / "a.xlsx"
     source.write_bytes(content)
     with pytest.raises(InputError, match="not an Excel workbook"):

@@ -61,7 +61,7 @@ def test_correlations_are_positive_semidefinite(
     assert np.linalg.eigvalsh(r).min() > -1e-9
 
 
-def test_what_is_no_dependence_is_refused() -> None:
+def test_what_is_no_dependence_is_rejected() -> None:
     with pytest.raises(InputError, match=r"is 0\.955 and must be 1"):
         replace(LAW, rho_e=0.01)
     with pytest.raises(InputError, match="rho_e is a fraction between 0 and 1"):

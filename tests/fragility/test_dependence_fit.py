@@ -121,7 +121,7 @@ def test_many_cells_are_joined(monkeypatch: pytest.MonkeyPatch) -> None:
     assert max(spread) < 0.5
 
 
-def test_too_little_is_refused(columns: dict[str, Any]) -> None:
+def test_too_little_is_rejected(columns: dict[str, Any]) -> None:
     with pytest.raises(InputError, match="differ in length"):
         estimate_dependence(**{**columns, "p2": [1.0]})
     few = columns["earthquake"] < 5

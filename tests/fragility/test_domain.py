@@ -233,7 +233,7 @@ def test_ratios_do_not_change_with_the_scale_of_the_motion() -> None:
     "broken",
     [{}, {"names": ["p2", "kr"]}, {"centre": [0.0]}, {"inverse_covariance": [[1.0]]}],
 )
-def test_a_scatter_that_is_not_whole_is_refused(model: FragilityModel, broken: Any) -> None:
+def test_a_scatter_that_is_not_whole_is_rejected(model: FragilityModel, broken: Any) -> None:
     whole = {
         "names": ["p2", "kr", "pgv_m_s"], "centre": [0.0, -3.0, -1.0],
         "inverse_covariance": np.eye(3).tolist(), "radius": 3.0,

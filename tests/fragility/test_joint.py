@@ -131,7 +131,7 @@ def test_count_of_nothing_or_all() -> None:
     assert [int(count_quantiles(3, mean, 0.0, 0.5)) for mean in (0.0, 3.0)] == [0, 3]
 
 
-def test_what_is_no_portfolio_is_refused() -> None:
+def test_what_is_no_portfolio_is_rejected() -> None:
     with pytest.raises(InputError, match="columns of one length"):
         Placement.of([0.0, 1.0], [0.0, 1.0, 2.0])
     with pytest.raises(InputError, match="must be finite"):

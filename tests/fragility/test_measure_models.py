@@ -10,11 +10,11 @@ import pytest
 from rbfrag.db.location import REFERENCE
 from rbfrag.db.model_file import read_models
 from rbfrag.errors import ModelError, UnknownModelError
-from rbfrag.fragility.checks import CREDIBLE
 from rbfrag.fragility.measures import TERMS
 from rbfrag.fragility.methods import method_named
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.fragility.prediction import Prediction, answer_given
+from rbfrag.fragility.validation import CREDIBLE
 from rbfrag.question.question import predict
 from rbfrag.vocabulary.quantities import SPECTRAL
 from tests.fragility.conftest import model_row

@@ -9,8 +9,8 @@ from rbfrag.db.engine import opened_database
 from rbfrag.db.location import REFERENCE
 from rbfrag.db.models import load_model, save_model, set_default
 from rbfrag.errors import DatabaseNotFoundError, InputError, ModelError, UnknownModelError
-from rbfrag.fragility.lookup import SHIPPED, find_model, stored_rows
 from rbfrag.fragility.model_list import ModelList
+from rbfrag.fragility.model_selection import SHIPPED, find_model, stored_rows
 from rbfrag.question.question import predict
 
 

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from rbfrag.db.location import REFERENCE
 from rbfrag.db.model_file import ModelRow
 from rbfrag.fragility.fit.data import KR
-from rbfrag.fragility.lookup import stored_rows
 from rbfrag.fragility.model import FragilityModel
+from rbfrag.fragility.model_selection import stored_rows
 from rbfrag.fragility.prediction import answer_given
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2 as G
 from rbfrag.solver.results import FloatArray

@@ -1,4 +1,4 @@
-"""Models of older forms are refused, with the line that fits them again."""
+"""Models of older forms are rejected, with the line that fits them again."""
 
 from __future__ import annotations
 
@@ -51,17 +51,17 @@ def app_command(name: str) -> Any:
 def test_the_line_fits_it_again(
     row: Callable[..., ModelRow], changes: dict[str, object], line: str
 ) -> None:
-    with pytest.raises(ModelError, match="fitted by an older rbfrag") as refused:
+    with pytest.raises(ModelError, match="fitted by an older rbfrag") as rejected:
         FragilityModel.from_row(row(**{"name": "mine", "form": MODEL_FORM - 1, **changes}))
-    assert str(refused.value).endswith(line)
-    assert len(str(refused.value)) < 500
+    assert str(rejected.value).endswith(line)
+    assert len(str(rejected.value)) < 500
     words = shlex.split(line)[2:]
     asked = app_command("fit").make_context("fit", words).params
     assert asked["name"] == changes.get("name", "mine")
     assert asked["replace"] is True
 
 
-def test_predict_refuses_it(row: Callable[..., ModelRow], tmp_path: Path) -> None:
+def test_predict_rejects_it(row: Callable[..., ModelRow], tmp_path: Path) -> None:
     file = tmp_path / "old.db"
     with opened_database(file, create=True) as engine, engine.begin() as connection:
         save_model(connection, replace(row(), form=1))

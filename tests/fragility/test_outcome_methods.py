@@ -1,4 +1,4 @@
-"""Fits of outcomes: known parameters come back, and bad data are refused."""
+"""Fits of outcomes: known parameters come back, and bad data are rejected."""
 
 from dataclasses import replace
 
@@ -184,13 +184,13 @@ def broken(source: FitSource, kind: str) -> FitSource:
         ("few", "7 outcomes on the grid toppled; a fit requires 20"),
     ],
 )
-def test_outcomes_that_cannot_carry_a_fit_are_refused(kind, words):
+def test_outcomes_that_cannot_carry_a_fit_are_rejected(kind, words):
     source = drawn_outcomes("logistic", "pgv", TRUTH["logistic", "pgv"])
     with pytest.raises(FitError, match=words):
         fit(broken(source, kind), term="pgv", method="logistic")
 
 
-def test_what_does_not_go_together_is_refused():
+def test_what_does_not_go_together_is_rejected():
     source = drawn_outcomes("logistic", "pgv", TRUTH["logistic", "pgv"], events=5)
     with pytest.raises(
         InputError, match=r"record cannot be combined with the term pgv: it fits xp"

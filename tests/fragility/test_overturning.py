@@ -1,4 +1,4 @@
-"""Models of free-standing blocks: restitution, what mechanics rules out, what is refused."""
+"""Models of free-standing blocks: restitution, what mechanics rules out, what is rejected."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from rbfrag.db.engine import opened_database
 from rbfrag.db.model_file import ModelRow
 from rbfrag.db.models import save_model
 from rbfrag.errors import InputError
-from rbfrag.fragility.lookup import block_of, find_model, unused_measures
 from rbfrag.fragility.methods import method_named
 from rbfrag.fragility.methods.overturning import BLOCK
 from rbfrag.fragility.model import FragilityModel
+from rbfrag.fragility.model_selection import block_of, find_model, unused_measures
 from rbfrag.fragility.prediction import Prediction, answer_given
 from rbfrag.fragility.prediction_array import PredictionArray
 
@@ -167,15 +167,15 @@ def test_less_restitution_less_shaking_and_more_strength_are_safer() -> None:
         assert rising[0] < 1e-3
 
 
-def test_pga_alone_is_refused_and_told_what_would_suffice(tmp_path: Path) -> None:
+def test_pga_alone_is_rejected_and_told_what_would_suffice(tmp_path: Path) -> None:
     path = tmp_path / "rocking.db"
     with opened_database(path, create=True) as engine, engine.begin() as connection:
         for term, b in (("pgv", PGV), ("pga_m", (0.0,) * 8), ("pgv_pga", T2)):
             save_model(connection, stored(term, b).row)
     block = ["p2", "kr"]
-    with pytest.raises(InputError, match=r"give pga_g and magnitude, or pgv_m_s$") as refused:
+    with pytest.raises(InputError, match=r"give pga_g and magnitude, or pgv_m_s$") as rejected:
         find_model(None, [*block, "pga_g"], path, kind="rocking")
-    assert len(str(refused.value)) < 500
+    assert len(str(rejected.value)) < 500
     assert (
         find_model(None, [*block, "pga_g", "magnitude"], path, kind="rocking").term.name == "pga_m"
     )

@@ -249,7 +249,7 @@ def test_the_callers_arrays_stay_as_they_are(row):
     assert np.array_equal(pgv, [0.6, np.nan, -1.0], equal_nan=True)
 
 
-def test_nan_can_be_refused_in_arrays(row):
+def test_nan_can_be_rejected_in_arrays(row):
     with pytest.raises(InputError, match=r"element \(1, 0\): kr = nan"):
         predict(3.0, [[0.1], [np.nan]], pgv_m_s=0.6, model=row(), nan="raise")
     with pytest.raises(InputError, match="'ignore'"):
@@ -288,7 +288,7 @@ def test_nan_can_be_refused_in_arrays(row):
         ({"p2": [[1.0], [1.0, 2.0]]}, "p2 is not an array of numbers"),
     ],
 )  # fmt: skip
-def test_bad_input_is_refused_in_words(row, changes, words):
+def test_bad_input_is_rejected_in_words(row, changes, words):
     arguments = {"p2": 3.0, "kr": 0.1, "pgv_m_s": 0.6, "model": row(), **changes}
     with pytest.raises(InputError, match=words):
         predict(**arguments)
@@ -348,7 +348,7 @@ def test_arrays_have_a_headline(row):
     assert alone.headline() == "No probability of 1 block"
 
 
-def test_a_model_of_an_unknown_method_or_a_torn_row_is_refused(row):
+def test_a_model_of_an_unknown_method_or_a_torn_row_is_rejected(row):
     with pytest.raises(ModelError, match=r"'oracle'.*update rbfrag"):
         predict(3.0, 0.1, pgv_m_s=0.6, model=row(method="oracle"))
     with pytest.raises(ModelError, match="covariance of another size"):

@@ -207,13 +207,13 @@ def test_a_motion_answers_for_every_kind() -> None:
         ({"rotation_deg": 2.0}, "rotation_deg is not a failure criterion"),
     ],
 )
-def test_what_cannot_be_answered_is_refused(changes: dict[str, Any], words: str) -> None:
+def test_what_cannot_be_answered_is_rejected(changes: dict[str, Any], words: str) -> None:
     asked = {**SLIDE, "pgv_m_s": 0.5, "pga_g": 0.5, "model": row_of("sliding"), **changes}
     with pytest.raises(InputError, match=words):
         predict(**asked)
 
 
-def test_a_model_of_another_rotation_is_refused() -> None:
+def test_a_model_of_another_rotation_is_rejected() -> None:
     asked: dict[str, Any] = {**SLUMP, "pgv_m_s": 0.5, "pga_g": 1.0, "rotation_deg": 2.0}
     with pytest.raises(InputError, match="failure past recovery, not for a rotation of 2°"):
         predict(**asked, model=row_of("slumping"))
@@ -230,7 +230,7 @@ def test_a_model_of_another_rotation_is_refused() -> None:
         {"covariance": ((1.0,),)},
     ],
 )
-def test_torn_rows_are_refused(changes: dict[str, Any]) -> None:
+def test_torn_rows_are_rejected(changes: dict[str, Any]) -> None:
     with pytest.raises(ModelError):
         FragilityModel.from_row(replace(row_of("sliding"), **changes))
 

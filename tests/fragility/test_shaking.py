@@ -11,7 +11,7 @@ from scipy.stats import norm
 from rbfrag.db.location import REFERENCE
 from rbfrag.errors import InputError
 from rbfrag.fragility.joint import share_range
-from rbfrag.fragility.lookup import find_model
+from rbfrag.fragility.model_selection import find_model
 from rbfrag.fragility.prediction import Prediction
 from rbfrag.fragility.shaking import POINTS, WEIGHTS, correlation
 from rbfrag.fragility.shared_shaking import shaken_share_range
@@ -141,7 +141,7 @@ def test_amplification_moves_median_and_scatter() -> None:
     assert certain == [ask(pgv_m_s=pgv).probability for pgv in (0.5, 0.7)]
 
 
-def test_what_cannot_be_used_is_refused() -> None:
+def test_what_cannot_be_used_is_rejected() -> None:
     with pytest.raises(InputError, match="pgv_sigma = -1"):
         ask(pgv_m_s=0.5, pgv_sigma=-1.0)
     with pytest.raises(InputError, match="amplification = 0"):

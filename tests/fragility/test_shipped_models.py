@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from rbfrag.db.location import REFERENCE
 from rbfrag.db.model_file import read_models
-from rbfrag.fragility.intervals import quantiles_of
+from rbfrag.fragility.confidence import quantiles_of
 from rbfrag.fragility.method import arrays
 from rbfrag.fragility.methods import method_named
 from rbfrag.fragility.model import FragilityModel

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from rbfrag.errors import InputError
-from rbfrag.fragility.intervals import ParameterErrors
+from rbfrag.fragility.confidence import ParameterErrors
 from rbfrag.fragility.measures import Term
 from rbfrag.fragility.method import LOGIT, OF_OUTCOME, TOPPLING_BLOCK, Form, LinearPredictor, Method
 from rbfrag.fragility.model import FragilityModel
@@ -87,6 +87,6 @@ def test_their_values_may_be_arrays(model):
         ({1.0: 0.4}, "requires sa10_g and sa03_g .*given: sa10_g"),
     ],
 )
-def test_what_is_refused(model, sa_g, words):
+def test_what_is_rejected(model, sa_g, words):
     with pytest.raises(InputError, match=words):
         predict(3.0, 0.1, sa_g=sa_g, model=model)

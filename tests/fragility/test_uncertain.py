@@ -1,4 +1,4 @@
-"""Uncertain blocks: the integral against closed forms and other ways, its limits and refusals."""
+"""Uncertain blocks: the integral against closed forms and other ways, its limits and rejections."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from rbfrag.db.location import REFERENCE
 from rbfrag.db.model_file import ModelRow
 from rbfrag.errors import InputError
 from rbfrag.fragility.joint import share_range
-from rbfrag.fragility.lookup import find_model
 from rbfrag.fragility.method import SINGLE, arrays
 from rbfrag.fragility.methods import method_named, methods
 from rbfrag.fragility.model import FragilityModel
+from rbfrag.fragility.model_selection import find_model
 from rbfrag.fragility.prediction import Prediction, answer_given
 from rbfrag.fragility.prediction_array import PredictionArray
 from rbfrag.question.document import answer_numbers
@@ -219,12 +219,12 @@ def test_extrapolation_is_said_where_part_of_the_block_is_outside() -> None:
         ({"pgv_m_s": [0.1, 0.2], "weights": 1.0}, "a single motion is required"),
     ],
 )
-def test_what_is_no_uncertainty_is_refused(given: dict[str, Any], words: str) -> None:
+def test_what_is_no_uncertainty_is_rejected(given: dict[str, Any], words: str) -> None:
     with pytest.raises(InputError, match=words):
         predict(**{"p2": 3.0, "kr": 0.1, "pgv_m_s": 0.6, **given})
 
 
-def test_a_sigma_without_its_value_is_refused() -> None:
+def test_a_sigma_without_its_value_is_rejected() -> None:
     with pytest.raises(InputError, match="restitution_sigma requires restitution"):
         one(stored("pgv_pga", T2), p2=3.0, kr=0.2, pgv_m_s=0.6, pga_g=0.5, restitution_sigma=0.1)
 

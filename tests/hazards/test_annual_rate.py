@@ -148,7 +148,7 @@ def test_probability_in_a_period() -> None:
         probability_in(0.0, np.array([0.01]))
 
 
-def test_a_fragility_that_is_no_number_is_refused() -> None:
+def test_a_fragility_that_is_no_number_is_rejected() -> None:
     with pytest.raises(InputError, match="not a number"):
         failure_rate(power_law(), lambda x: np.where(x > 1.0, np.nan, 0.0))
 
@@ -166,7 +166,7 @@ def test_a_fragility_that_is_no_number_is_refused() -> None:
         ([0.1, 0.2], [3e-3], "2 levels and 1 rates"),
     ],
 )
-def test_disorder_is_refused(levels: list[float], rates: list[float], words: str) -> None:
+def test_disorder_is_rejected(levels: list[float], rates: list[float], words: str) -> None:
     with pytest.raises(InputError, match=words):
         hazard_curve("pgv_m_s", levels, rates, source="a.csv")
 

@@ -12,9 +12,9 @@ import rbfrag
 from rbfrag.errors import InputError
 from rbfrag.exchange.event_losses import losses
 from rbfrag.exchange.openquake.events import JobFiles, read_events, read_magnitudes
-from rbfrag.hazards.between_measures import component_of_velocity, velocity_of
 from rbfrag.hazards.curve import hazard_curve
 from rbfrag.hazards.disaggregation import Disaggregation
+from rbfrag.hazards.im_uncertainty import component_of_velocity, velocity_of
 from rbfrag.question.components import COMPONENTS
 
 HEAD = """#,,,,"generated_by='OpenQuake engine 3.26.2', investigation_time=50.0, \
@@ -126,7 +126,7 @@ def test_survival_stands_on_the_same_rate(tmp_path: Path) -> None:
         (("mean\n", "rlz0,rlz1\n"), "mean or one realization"),
     ],
 )
-def test_what_is_no_disaggregation_is_refused(
+def test_what_is_no_disaggregation_is_rejected(
     tmp_path: Path, change: tuple[str, str], message: str
 ) -> None:
     with pytest.raises(InputError, match=message.replace("(", r"\(")):
@@ -136,7 +136,7 @@ def test_what_is_no_disaggregation_is_refused(
         Disaggregation.read(written(tmp_path, traditional))
 
 
-def test_what_a_disaggregation_does_not_tell_is_refused(tmp_path: Path) -> None:
+def test_what_a_disaggregation_does_not_tell_is_rejected(tmp_path: Path) -> None:
     file = written(tmp_path, MAG)
     pga = hazard_curve("pga_g", LEVELS, 1e-4 * LEVELS**-2.0)
     with pytest.raises(InputError, match=r"must start at or below k_r.*0\.02 g.*from 0\.019 g"):

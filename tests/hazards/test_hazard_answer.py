@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rbfrag.hazards.answer import hazard
 from rbfrag.hazards.curve import hazard_curve
 from rbfrag.hazards.hazard_answer import HazardAnswer
+from rbfrag.hazards.hazard_rates import hazard
 from rbfrag.results.numbers import annual_rate, return_period, return_periods, with_interval
 from tests.fragility.conftest import SHARED, model_row
 

@@ -11,11 +11,11 @@ import pytest
 from scipy.integrate import quad
 
 from rbfrag.errors import InputError
-from rbfrag.fragility.lookup import find_model
+from rbfrag.fragility.model_selection import find_model
 from rbfrag.fragility.prediction import Prediction, answer_given
-from rbfrag.hazards.answer import hazard
-from rbfrag.hazards.between_measures import CONVERSIONS
 from rbfrag.hazards.curve import HazardCurve, hazard_curve
+from rbfrag.hazards.hazard_rates import hazard
+from rbfrag.hazards.im_uncertainty import CONVERSIONS
 from tests.hazards.conftest import measure_row
 
 K, B = 1e-4, 2.0
@@ -122,7 +122,7 @@ def test_no_other_period_is_answered(measures_db: str, period: float) -> None:
 
 
 @pytest.mark.parametrize("model", ["bounded-pga_sa10", "bounded-pgv_kr"])
-def test_a_model_that_reads_more_is_refused(measures_db: str, model: str) -> None:
+def test_a_model_that_reads_more_is_rejected(measures_db: str, model: str) -> None:
     with pytest.raises(InputError, match="requires"):
         hazard(power_law("pga_g", None), 3.0, 0.1, model=model, db=measures_db)
 
@@ -138,7 +138,7 @@ def test_a_model_that_reads_more_is_refused(measures_db: str, model: str) -> Non
         ("sa_g", 1.0, {"convert": "newmark_hall_1982", "convert_sigma": math.nan}, "above zero"),
     ],
 )
-def test_conversions_that_make_no_sense_are_refused(
+def test_conversions_that_make_no_sense_are_rejected(
     measures_db: str, measure: str, period: float | None, options: dict[str, Any], words: str
 ) -> None:
     with pytest.raises(InputError, match=words):

@@ -16,10 +16,10 @@ from rbfrag.fragility.joint import Placement
 from rbfrag.fragility.joint_sampling import JointSampler
 from rbfrag.hazards import joint_rate
 from rbfrag.hazards.annual_rate import failure_rate
-from rbfrag.hazards.answer import hazard, hazard_at_sites
 from rbfrag.hazards.branches import mixture_quantiles
 from rbfrag.hazards.curve import HazardCurve, hazard_curve
 from rbfrag.hazards.hazard_answer import HazardAnswer
+from rbfrag.hazards.hazard_rates import hazard, hazard_at_sites
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.question.question import predict
 from tests.fragility.conftest import SHARED, model_row

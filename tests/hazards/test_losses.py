@@ -22,9 +22,9 @@ from rbfrag.exchange.openquake.events import JobFiles, read_events
 from rbfrag.fragility.joint_sampling import JointSampler
 from rbfrag.fragility.methods import method_named
 from rbfrag.hazards import event_counts
-from rbfrag.hazards.answer import hazard
 from rbfrag.hazards.curve_file import read_hazard_curves
 from rbfrag.hazards.event_counts import EventBatch, EventYears, count_years
+from rbfrag.hazards.hazard_rates import hazard
 from rbfrag.hazards.loss_answer import LossAnswer
 from rbfrag.hazards.uncertainty import rate_interval, share_interval
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2

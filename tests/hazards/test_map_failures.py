@@ -202,7 +202,7 @@ def test_where_nothing_fails(row: Row) -> None:
     assert told["expected_failures"] == told["failures_p95"] == told["probability_any"] == 0.0
 
 
-def test_refusals(row: Row) -> None:
+def test_rejections(row: Row) -> None:
     answer = blocks_at_places(row(), certain=True)
     with pytest.raises(InputError, match="draws = 3"):
         map_failures(answer, {"p2": P2, "kr": KR}, PLACES, draws=3)

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from rbfrag.fragility.lookup import find_model
 from rbfrag.fragility.model import FragilityModel
+from rbfrag.fragility.model_selection import find_model
 from rbfrag.fragility.prediction import answer_given
 from rbfrag.fragility.shaking_points import correlations
 from rbfrag.hazards.maps import site_probability as site_module

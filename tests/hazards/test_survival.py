@@ -16,11 +16,11 @@ from scipy.special import ndtr
 from rbfrag.db.model_file import ModelRow
 from rbfrag.errors import InputError
 from rbfrag.hazards.annual_rate import failure_rate
-from rbfrag.hazards.answer import hazard
 from rbfrag.hazards.curve import HazardCurve, hazard_curve
 from rbfrag.hazards.curve_file import read_hazard_curves
-from rbfrag.hazards.standing import Age, Standing, weights_given_standing
+from rbfrag.hazards.hazard_rates import hazard
 from rbfrag.hazards.survival import survival
+from rbfrag.hazards.survival_probability import Age, Standing, weights_given_standing
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2 as G
 from tests.fragility.conftest import model_row
 
@@ -258,7 +258,7 @@ def test_blocks_that_nothing_fells_have_no_factor() -> None:
          "draws = 0"),
     ],
 )  # fmt: skip
-def test_refusals(changes: dict[str, Any], words: str) -> None:
+def test_rejections(changes: dict[str, Any], words: str) -> None:
     asked = {"curves": power_law(), "fragility": lognormal, "age_years": YEARS, **changes}
     if asked["fragility"] is None:
         asked |= {"model": model_row(), "kind": "toppling"}
@@ -266,7 +266,7 @@ def test_refusals(changes: dict[str, Any], words: str) -> None:
         survival(asked.pop("curves"), **asked)
 
 
-def test_curves_of_two_sites_are_refused() -> None:
+def test_curves_of_two_sites_are_rejected() -> None:
     x = np.array([0.1, 1.0])
     here, there = (hazard_curve("pgv_m_s", x, [1e-2, 1e-4], site=site) for site in ("A", "B"))
     with pytest.raises(InputError, match="2 sites"):

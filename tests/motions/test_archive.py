@@ -29,7 +29,7 @@ def zipped(
     return path
 
 
-def refusal(path: Path) -> str:
+def rejection(path: Path) -> str:
     with pytest.raises(MotionFileError) as caught:
         read_motions(path)
     assert str(path) in str(caught.value)
@@ -97,23 +97,23 @@ def test_adding(tmp_path: Path, records: Path) -> None:
         add_motions(tmp_path / "none.zip" / "a.v2", db=tmp_path / "one.db")
 
 
-def test_spectra_alone_are_refused(tmp_path: Path) -> None:
+def test_spectra_alone_are_rejected(tmp_path: Path) -> None:
     path = zipped(tmp_path / "spectra.zip", {"chan001.v3": V3})
-    assert "use the .v2" in refusal(path)
+    assert "use the .v2" in rejection(path)
     report = add_motions(path, db=tmp_path / "one.db")
     assert "use the .v2" in report.failed[0].reason
 
 
 def test_a_member_that_is_not_there(records: Path) -> None:
-    assert "no such member in the zip archive; members are, for example" in refusal(
+    assert "no such member in the zip archive; members are, for example" in rejection(
         records / "chan002.v2"
     )
-    assert "there is no such file" in refusal(records.parent / "other" / "chan002.v2")
+    assert "there is no such file" in rejection(records.parent / "other" / "chan002.v2")
 
 
 @pytest.mark.parametrize("name", ["/etc/passwd", "../outside.v2", "a/../../b.v2", "C:/a.v2"])
 def test_names_that_lead_out(tmp_path: Path, name: str) -> None:
-    assert "points outside the archive" in refusal(zipped(tmp_path / "out.zip", {name: V2}))
+    assert "points outside the archive" in rejection(zipped(tmp_path / "out.zip", {name: V2}))
 
 
 def test_a_name_twice(tmp_path: Path) -> None:
@@ -122,22 +122,22 @@ def test_a_name_twice(tmp_path: Path) -> None:
         file.writestr("a.v2", V2)
         with pytest.warns(UserWarning, match="Duplicate name"):
             file.writestr("a.v2", V2)
-    assert "'a.v2' twice" in refusal(path)
+    assert "'a.v2' twice" in rejection(path)
 
 
 def test_bounds(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     bomb = zipped(tmp_path / "bomb.zip", {"a.v2": b"0" * 10_000_000})
     assert bomb.stat().st_size < 20_000
-    assert "compression ratio exceeds 200" in refusal(bomb)
+    assert "compression ratio exceeds 200" in rejection(bomb)
     many = zipped(tmp_path / "many.zip", {f"{i}.v2": "" for i in range(200)})
     monkeypatch.setattr(archive, "LARGEST_DIRECTORY_BYTES", 5000)
-    assert "too many members" in refusal(many)
+    assert "too many members" in rejection(many)
     monkeypatch.setattr(archive, "LARGEST_FILE_BYTES", len(V2) * 3 // 2)
     two = zipped(tmp_path / "two.zip", {"a.v2": V2, "b.v2": V2})
-    assert f"{2 * len(V2)} bytes long: give one" in refusal(two)
+    assert f"{2 * len(V2)} bytes long: give one" in rejection(two)
     assert len(read_motions(two / "a.v2")) == 2
     monkeypatch.setattr(archive, "LARGEST_FILE_BYTES", len(V2) - 1)
-    assert "too large for an accelerogram" in refusal(two / "a.v2")
+    assert "too large for an accelerogram" in rejection(two / "a.v2")
 
 
 def test_a_size_that_is_understated(tmp_path: Path) -> None:
@@ -147,19 +147,21 @@ def test_a_size_that_is_understated(tmp_path: Path) -> None:
         at = raw.index(mark) + offset
         raw[at : at + 4] = (100).to_bytes(4, "little")
     (tmp_path / "lie.zip").write_bytes(raw)
-    assert "the zip is damaged" in refusal(tmp_path / "lie.zip")
+    assert "the zip is damaged" in rejection(tmp_path / "lie.zip")
 
 
 def test_what_cannot_be_unpacked(tmp_path: Path) -> None:
-    assert "has no record" in refusal(zipped(tmp_path / "none.zip", {"README.md": "x"}))
-    assert "deflate" in refusal(
+    assert "has no record" in rejection(zipped(tmp_path / "none.zip", {"README.md": "x"}))
+    assert "deflate" in rejection(
         zipped(tmp_path / "lzma.zip", {"a.v2": V2}, method=zipfile.ZIP_LZMA)
     )
     inner = io.BytesIO()
     with zipfile.ZipFile(inner, "w") as file:
         file.writestr("a.v2", V2)
-    assert "unpack it" in refusal(zipped(tmp_path / "nested.zip", {"inner.zip": inner.getvalue()}))
+    assert "unpack it" in rejection(
+        zipped(tmp_path / "nested.zip", {"inner.zip": inner.getvalue()})
+    )
     raw = zipped(tmp_path / "cut.zip", {"a.v2": V2}).read_bytes()
     for kept in (4, 30, len(raw) // 2, len(raw) - 5):
         (tmp_path / "cut.zip").write_bytes(raw[:kept])
-        assert "the zip is damaged" in refusal(tmp_path / "cut.zip")
+        assert "the zip is damaged" in rejection(tmp_path / "cut.zip")

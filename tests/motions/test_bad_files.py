@@ -14,7 +14,7 @@ from tests.motions.written import AT2_SAMPLING, at2, v2a
 SAMPLES = [f"{0.001 * i:.5E}" for i in range(1, 13)]
 
 
-def refusal(path: Path, **stated: object) -> MotionFileError:
+def rejection(path: Path, **stated: object) -> MotionFileError:
     with pytest.raises(MotionFileError) as caught:
         read_motions(path, **stated)  # type: ignore[arg-type]
     assert str(path) in str(caught.value)
@@ -29,11 +29,11 @@ def written(folder: Path, content: str | bytes, name: str = "record.AT2") -> Pat
 
 
 def test_missing(tmp_path: Path) -> None:
-    assert "no such file" in refusal(tmp_path / "nowhere.AT2").reason
+    assert "no such file" in rejection(tmp_path / "nowhere.AT2").reason
 
 
 def test_folder(tmp_path: Path) -> None:
-    assert "folder" in refusal(tmp_path).reason
+    assert "folder" in rejection(tmp_path).reason
 
 
 @pytest.mark.parametrize("name", ["x" * 5000, "x" * 5000 + "#0", "a\0b", "a#" + "9" * 5000])
@@ -44,18 +44,18 @@ def test_name_that_no_file_can_have(name: str) -> None:
 
 @pytest.mark.parametrize("content", [b"", b"\n\n  \n", b"\xef\xbb\xbf"])
 def test_empty(tmp_path: Path, content: bytes) -> None:
-    assert "empty" in refusal(written(tmp_path, content)).reason
+    assert "empty" in rejection(written(tmp_path, content)).reason
 
 
 @pytest.mark.parametrize(
     "content", [b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR", bytes(range(256)) * 4, b"SQLite format 3\0"]
 )
 def test_binary(tmp_path: Path, content: bytes) -> None:
-    assert "binary" in refusal(written(tmp_path, content)).reason
+    assert "binary" in rejection(written(tmp_path, content)).reason
 
 
 def test_packed(tmp_path: Path) -> None:
-    assert "it is a gzip file: unpack it" in refusal(written(tmp_path, b"\x1f\x8b\x08\0")).reason
+    assert "it is a gzip file: unpack it" in rejection(written(tmp_path, b"\x1f\x8b\x08\0")).reason
 
 
 @pytest.mark.parametrize(
@@ -83,7 +83,7 @@ def test_content_decides_not_the_name(tmp_path: Path) -> None:
 @pytest.mark.parametrize("sampling", AT2_SAMPLING)
 @pytest.mark.parametrize("stated", [11, 13])
 def test_at2_count_disagrees(tmp_path: Path, sampling: str, stated: int) -> None:
-    error = refusal(written(tmp_path, at2(SAMPLES, 0.01, sampling=sampling, npts=stated)))
+    error = rejection(written(tmp_path, at2(SAMPLES, 0.01, sampling=sampling, npts=stated)))
     assert error.line == 4
     assert f"{stated} samples" in error.reason
     assert "12 follow" in error.reason
@@ -93,7 +93,7 @@ def test_at2_count_disagrees(tmp_path: Path, sampling: str, stated: int) -> None
 def test_at2_truncated_at_every_line(tmp_path: Path) -> None:
     lines = at2(SAMPLES, 0.01).splitlines(keepends=True)
     for kept in range(len(lines)):
-        refusal(written(tmp_path, "".join(lines[:kept])))
+        rejection(written(tmp_path, "".join(lines[:kept])))
 
 
 @pytest.mark.parametrize(
@@ -121,7 +121,7 @@ def test_at2_bad_value(
 ) -> None:
     text = at2(SAMPLES, 0.01)
     assert old in text
-    error = refusal(written(tmp_path, text.replace(old, new, 1)))
+    error = rejection(written(tmp_path, text.replace(old, new, 1)))
     assert error.line == line
     for word in words:
         assert word in error.reason
@@ -129,14 +129,14 @@ def test_at2_bad_value(
 
 def test_at2_contradicting_options(tmp_path: Path) -> None:
     path = written(tmp_path, at2(SAMPLES, 0.01))
-    assert "omit units" in refusal(path, units="m/s2").reason
-    assert "omit dt_s" in refusal(path, dt_s=0.02).reason
+    assert "omit units" in rejection(path, units="m/s2").reason
+    assert "omit dt_s" in rejection(path, dt_s=0.02).reason
     assert read_motion(path, units="g", dt_s=0.01).npts == 12
 
 
 def test_at2_without_unit(tmp_path: Path) -> None:
     path = written(tmp_path, at2(SAMPLES, 0.01, quantity="ACCELERATION TIME HISTORY"))
-    assert "give units" in refusal(path).reason
+    assert "give units" in rejection(path).reason
     assert read_motion(path, units="m/s2").pga_g == pytest.approx(0.012 / 9.80665)
 
 
@@ -172,7 +172,7 @@ def test_v2a_bad_value(
     assert len(read_motions(written(tmp_path, V2A))) == 2
     changed = change(V2A)
     assert changed != V2A
-    error = refusal(written(tmp_path, changed))
+    error = rejection(written(tmp_path, changed))
     assert error.line == line
     for word in words:
         assert word in error.reason
@@ -180,8 +180,8 @@ def test_v2a_bad_value(
 
 def test_v2a_contradicting_options(tmp_path: Path) -> None:
     path = written(tmp_path, V2A)
-    assert "omit units" in refusal(path, units="g").reason
-    assert "omit dt_s" in refusal(path, dt_s=0.01).reason
+    assert "omit units" in rejection(path, units="g").reason
+    assert "omit dt_s" in rejection(path, dt_s=0.01).reason
 
 
 @pytest.mark.parametrize("dt_s", [0.0, -0.01, float("nan"), float("inf")])
@@ -202,11 +202,11 @@ def test_words_of_any_length_are_cut(tmp_path: Path) -> None:
         at2(SAMPLES, 0.01).replace("UNITS OF G", f"UNITS OF {long}"),
         V2A.replace("mm/s/s", long),
     ):
-        error = refusal(written(tmp_path, text), units="g")
+        error = rejection(written(tmp_path, text), units="g")
         assert len(error.reason) < 500
         assert "999…" in error.reason
 
 
 def test_a_dt_that_nothing_can_be_integrated_with(tmp_path: Path) -> None:
     path = written(tmp_path, at2(SAMPLES, 0.01).replace("DT=  .01000", "DT= 1.5E308"))
-    assert "12 samples at dt = 1.5e+308 s" in refusal(path).reason
+    assert "12 samples at dt = 1.5e+308 s" in rejection(path).reason

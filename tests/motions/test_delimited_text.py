@@ -27,7 +27,7 @@ def read(
     return read_motion(path, units=units, dt_s=dt_s)
 
 
-def refusal(
+def rejection(
     folder: Path, text: str, *, units: str | None = None, dt_s: float | None = None
 ) -> MotionFileError:
     with pytest.raises(MotionFileError) as caught:
@@ -71,18 +71,18 @@ def test_unit_of_caller(tmp_path: Path) -> None:
 
 def test_unit_is_never_guessed(tmp_path: Path) -> None:
     for header in ("", "# Quarry road\n", "time,acc\n", "# Time (s),Acceleration\n"):
-        assert "give units" in refusal(tmp_path, header + "0,1\n0.01,2\n").reason
+        assert "give units" in rejection(tmp_path, header + "0,1\n0.01,2\n").reason
 
 
 def test_unit_in_brackets_is_not_overruled(tmp_path: Path) -> None:
     text = "Zeit [s],Beschleunigung [m/s²]\n0,1\n0.01,2\n"
-    assert "m/s², not g" in refusal(tmp_path, text, units="g").reason
+    assert "m/s², not g" in rejection(tmp_path, text, units="g").reason
 
 
 def test_header_and_caller_disagree(tmp_path: Path) -> None:
     text = "# Time (s),Acceleration (m/s2)\n0,1\n0.01,2\n"
     assert read(tmp_path, text, units="m/sec/sec").npts == 2
-    error = refusal(tmp_path, text, units="g")
+    error = rejection(tmp_path, text, units="g")
     assert error.line == 1
     assert "m/s2, not g" in error.reason
     assert "omit units" in error.reason
@@ -103,7 +103,7 @@ def test_header_and_caller_disagree(tmp_path: Path) -> None:
 def test_headers_that_say_something_else(
     tmp_path: Path, header: str, line: int, words: tuple[str, ...]
 ) -> None:
-    error = refusal(tmp_path, header + "0,1\n0.01,2\n")
+    error = rejection(tmp_path, header + "0,1\n0.01,2\n")
     assert error.line == line
     for word in words:
         assert word in error.reason
@@ -127,8 +127,8 @@ def test_one_column(tmp_path: Path) -> None:
     motion = read(tmp_path, text, dt_s=0.005)
     assert motion.acceleration_g.tolist() == [0.1, -0.2, 0.3]
     assert motion.dt_s == 0.005
-    assert "dt_s" in refusal(tmp_path, text).reason
-    error = refusal(tmp_path, "# acc (g)\n0.1\n\n0.3\n", dt_s=0.005)
+    assert "dt_s" in rejection(tmp_path, text).reason
+    error = rejection(tmp_path, "# acc (g)\n0.1\n\n0.3\n", dt_s=0.005)
     assert error.line == 3
     assert "missing sample" in error.reason
 
@@ -160,14 +160,14 @@ def test_caller_may_state_the_dt_that_the_times_show(tmp_path: Path) -> None:
     text = "# acc (g)\n0.000 1\n0.008 2\n0.017 3\n0.025 4\n"
     assert read(tmp_path, text).dt_s == 0.0083
     assert read(tmp_path, text, dt_s=1.0 / 120.0).dt_s == 1.0 / 120.0
-    error = refusal(tmp_path, text, dt_s=0.005)
+    error = rejection(tmp_path, text, dt_s=0.005)
     assert "0.0083" in error.reason
     assert "0.005" in error.reason
     assert "dt_s" in error.reason
 
 
 def test_single_row(tmp_path: Path) -> None:
-    assert "dt_s" in refusal(tmp_path, "# acc (g)\n0.0 1\n").reason
+    assert "dt_s" in rejection(tmp_path, "# acc (g)\n0.0 1\n").reason
     assert read(tmp_path, "# acc (g)\n0.0 1\n", dt_s=0.01).npts == 1
 
 
@@ -207,15 +207,15 @@ def test_start_other_than_zero_is_remarked(tmp_path: Path) -> None:
     ],
 )
 def test_bad_rows(tmp_path: Path, rows: str, line: int, words: tuple[str, ...]) -> None:
-    error = refusal(tmp_path, "# Time (s), Acceleration (g)\n" + rows)
+    error = rejection(tmp_path, "# Time (s), Acceleration (g)\n" + rows)
     assert error.line == line
     for word in words:
         assert word in error.reason
 
 
 def test_header_without_rows(tmp_path: Path) -> None:
-    refusal(tmp_path, "# Time (s), Acceleration (g)\n")
-    refusal(tmp_path, "time_s,acc_g\n")
+    rejection(tmp_path, "# Time (s), Acceleration (g)\n")
+    rejection(tmp_path, "time_s,acc_g\n")
 
 
 @pytest.mark.parametrize(

@@ -153,7 +153,7 @@ def test_cut_file_is_read_on_request(tmp_path: Path) -> None:
     assert np.array_equal(back.acceleration_g, motion.acceleration_g[: back.npts])
 
 
-def test_refused(tmp_path: Path) -> None:
+def test_rejected(tmp_path: Path) -> None:
     motion = GroundMotion(shaking(1), 0.02)
     for motions, name, words in (
         ([motion], "m.txt", "unsupported format 'txt'"),

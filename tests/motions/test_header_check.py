@@ -1,4 +1,4 @@
-"""What a file states twice agrees with its samples, or the file is refused with both numbers."""
+"""What a file states twice agrees with its samples, or the file is rejected with both numbers."""
 
 from __future__ import annotations
 
@@ -172,7 +172,9 @@ def test_an_honest_file_says_nothing(tmp_path: Path, name: str) -> None:
 
 
 @pytest.mark.parametrize(("name", "what", "pattern", "new"), CASES)
-def test_a_mistake_is_refused(tmp_path: Path, name: str, what: str, pattern: str, new: str) -> None:
+def test_a_mistake_is_rejected(
+    tmp_path: Path, name: str, what: str, pattern: str, new: str
+) -> None:
     text = changed(made(name), pattern, new)
     with pytest.raises(MotionFileError) as caught:
         read(tmp_path, text)

@@ -235,7 +235,7 @@ def test_one_sample_and_zero_record() -> None:
     assert (m.pga_g, m.pgv_m_s, m.pgd_m, m.tm_s, m.final_velocity_m_s) == (0, 0, 0, None, 0)
 
 
-def test_a_record_beyond_floating_point_is_refused_in_words() -> None:
+def test_a_record_beyond_floating_point_is_rejected_in_words() -> None:
     with pytest.raises(InputError, match=r"PGA 1e\+308 g lasting 200 s .*check units"):
         _ = GroundMotion([1e308, 1e308, 1e308], 100.0).measures
 

@@ -1,4 +1,4 @@
-"""Metadata tables: found by file and trace, bad rows refused with their line."""
+"""Metadata tables: found by file and trace, bad rows rejected with their line."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def test_every_column(tmp_path: Path) -> None:
     assert read_metadata(path).not_read == ("notes",)
 
 
-def test_a_column_that_is_nearly_one_is_refused(tmp_path: Path) -> None:
+def test_a_column_that_is_nearly_one_is_rejected(tmp_path: Path) -> None:
     for wrong, right in (("proccesing", "processing"), ("magnitud", "magnitude"),
                          ("trace index", "trace_index"), ("eventid", "event_id")):  # fmt: skip
         with pytest.raises(MotionFileError, match=f"{wrong}: did you mean {right}"):
@@ -52,7 +52,7 @@ def test_a_column_that_is_nearly_one_is_refused(tmp_path: Path) -> None:
     assert read.not_read == ("operator", "rsn", "rank")
 
 
-def test_words_that_do_not_tell_of_the_processing_are_refused(tmp_path: Path) -> None:
+def test_words_that_do_not_tell_of_the_processing_are_rejected(tmp_path: Path) -> None:
     path = table(tmp_path, "file,processing\na.AT2,corrected\nb.AT2,uncorected\n")
     with pytest.raises(MotionFileError, match="begin with one of corrected") as caught:
         read_metadata(path)
@@ -163,13 +163,13 @@ def test_tables_that_cannot_be_opened(tmp_path: Path) -> None:
 
 @settings(max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.text(alphabet='file,trace_index\n\r"; 01.\x1c\u2028é/\\', max_size=80))
-def test_any_text_is_read_or_refused(tmp_path: Path, text: str) -> None:
+def test_any_text_is_read_or_rejected(tmp_path: Path, text: str) -> None:
     path = table(tmp_path, "file,trace_index\n" + text)
     try:
         metadata = read_metadata(path)
     except InputError as error:
-        refusal = str(error)
+        rejection = str(error)
     else:
-        refusal = ""
+        rejection = ""
         assert metadata.file(tmp_path / "not there") == []
-    assert not refusal or refusal.startswith(str(path))
+    assert not rejection or rejection.startswith(str(path))

@@ -1,4 +1,4 @@
-"""miniSEED: the counts of each channel, with the gain that is stated for them, or a refusal."""
+"""miniSEED: the counts of each channel, with the gain that is stated for them, or a rejection."""
 
 from __future__ import annotations
 
@@ -97,9 +97,9 @@ def test_a_gap(tmp_path: Path) -> None:
 def test_a_file_that_was_cut(tmp_path: Path) -> None:
     whole = miniseed(COUNTS, record_bytes=512)
     path = written(tmp_path, whole[:-200])
-    with pytest.raises(MotionFileError, match="truncated or damaged") as refused:
+    with pytest.raises(MotionFileError, match="truncated or damaged") as rejected:
         read_motions(path, gain=GAIN)
-    assert refused.value.fields == ("allow_partial",)
+    assert rejected.value.fields == ("allow_partial",)
     motion = read_motion(path, gain=GAIN, allow_partial=True)
     assert motion.is_partial
     assert "left out" in motion.remarks[-1]

@@ -15,7 +15,7 @@ from tests.motions.test_network_round_trips import STATE_NO_UNIT, WRITTEN
 UNITS = {name: ("g" if name in STATE_NO_UNIT else None) for name in WRITTEN}
 
 
-def refusal(
+def rejection(
     folder: Path, text: str, *, units: str | None = None, dt_s: float | None = None
 ) -> MotionFileError:
     path = folder / "record"
@@ -51,14 +51,14 @@ def test_a_line_of_samples_missing(tmp_path: Path, name: str) -> None:
     path.write_text("".join(lines))
     first = read_motions(path, units=UNITS[name])[0].npts
     assert first == 12
-    refused = 0
+    rejected = 0
     for left_out in range(len(lines)):
         path.write_text("".join(lines[:left_out] + lines[left_out + 1 :]))
         try:
             assert all(m.npts == 12 for m in read_motions(path, units=UNITS[name]))
         except MotionFileError:
-            refused += 1
-    assert refused >= 2
+            rejected += 1
+    assert rejected >= 2
 
 
 @pytest.mark.parametrize("name", WRITTEN)
@@ -67,11 +67,11 @@ def test_contradicting_options(tmp_path: Path, name: str) -> None:
     path = tmp_path / "record"
     path.write_text(text)
     assert read_motions(path, units=UNITS[name], dt_s=0.01)[0].dt_s == 0.01
-    assert "omit dt_s" in refusal(tmp_path, text, units=UNITS[name], dt_s=0.02).reason
+    assert "omit dt_s" in rejection(tmp_path, text, units=UNITS[name], dt_s=0.02).reason
     if name in STATE_NO_UNIT:
-        assert "give units" in refusal(tmp_path, text).reason
+        assert "give units" in rejection(tmp_path, text).reason
     else:
-        assert "omit units" in refusal(tmp_path, text, units="mm/s2").reason
+        assert "omit units" in rejection(tmp_path, text, units="mm/s2").reason
 
 
 def test_stated_unit_of_a_header_in_gal(tmp_path: Path) -> None:
@@ -153,7 +153,7 @@ def test_bad_value(tmp_path: Path, name: str, change: Change, words: tuple[str, 
     text = WRITTEN[name]()
     changed = text.replace(change[0], change[1], 1)
     assert changed != text
-    error = refusal(tmp_path, changed, units=UNITS[name])
+    error = rejection(tmp_path, changed, units=UNITS[name])
     for word in words:
         assert word in error.reason
     # a file of velocities alone has no line to blame
@@ -174,24 +174,24 @@ def test_bad_value(tmp_path: Path, name: str, change: Change, words: tuple[str, 
     ],
 )
 def test_strange_json(tmp_path: Path, change: Callable[[str], str]) -> None:
-    refusal(tmp_path, change(WRITTEN["SimCenter event JSON"]()), units="g")
+    rejection(tmp_path, change(WRITTEN["SimCenter event JSON"]()), units="g")
 
 
 def test_csmip_v2_cut_within_its_velocities(tmp_path: Path) -> None:
     text = WRITTEN["CSMIP/CDMG V2"]()
-    error = refusal(tmp_path, text[: text.rindex("2.0")])
+    error = rejection(tmp_path, text[: text.rindex("2.0")])
     assert "channel 1 does not end" in error.reason
 
 
 def test_cdmg_v1_of_zeros_alone(tmp_path: Path) -> None:
     text = written.cdmg_v1([("NS", ["0.000"] * 12)], 0.01)
-    assert "zero" in refusal(tmp_path, text).reason
+    assert "zero" in rejection(tmp_path, text).reason
 
 
 def test_volume_1_without_samples(tmp_path: Path) -> None:
     text = written.bhrc_v1([("L1", ["0.1"] * 12)], 0.01)
     head = text[: text.index("UNITS ARE")] + "UNITS ARE SECONDS AND G/10\n"
-    assert "no samples follow" in refusal(tmp_path, head).reason
+    assert "no samples follow" in rejection(tmp_path, head).reason
 
 
 def test_a_blank_that_numpy_does_not_know(tmp_path: Path) -> None:

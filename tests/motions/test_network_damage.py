@@ -1,4 +1,4 @@
-"""Files of networks damaged at random: a clean refusal or a valid motion, nothing else."""
+"""Files of networks damaged at random: a clean rejection or a valid motion, nothing else."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Files whose header states another number of samples: refused, or read and marked."""
+"""Files whose header states another number of samples: rejected, or read and marked."""
 
 from __future__ import annotations
 
@@ -83,7 +83,7 @@ def test_cut_within_a_number(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", [*WRITTEN, "PEER AT2", "GeoNet V2A"])
-def test_cut_anywhere_gives_a_beginning_or_a_refusal(tmp_path: Path, name: str) -> None:
+def test_cut_anywhere_gives_a_beginning_or_a_rejection(tmp_path: Path, name: str) -> None:
     made = {
         "PEER AT2": lambda: at2(SAMPLES, 0.01),
         "AFAD NSMN text": lambda: written.nsmn(
@@ -114,7 +114,7 @@ def test_cut_anywhere_gives_a_beginning_or_a_refusal(tmp_path: Path, name: str) 
     assert read or name in {"SimCenter event JSON"}
 
 
-def test_v2a_with_a_wrong_count_is_refused_all_the_same(tmp_path: Path) -> None:
+def test_v2a_with_a_wrong_count_is_rejected_all_the_same(tmp_path: Path) -> None:
     path = tmp_path / "record"
     text = v2a([("N28W", ["1.5"] * 24)], 0.02)
     path.write_text(text.replace("points  24", "points 240", 1))
@@ -127,14 +127,14 @@ def test_v2a_with_a_wrong_count_is_refused_all_the_same(tmp_path: Path) -> None:
         read_motions(path, allow_partial=True)
 
 
-def test_no_sample_at_all_is_refused(tmp_path: Path) -> None:
+def test_no_sample_at_all_is_rejected(tmp_path: Path) -> None:
     path = tmp_path / "record"
     path.write_text("".join(at2(SAMPLES, 0.01).splitlines(keepends=True)[:4]))
     with pytest.raises(MotionFileError):
         read_motions(path, allow_partial=True)
 
 
-def test_a_missing_row_beside_a_time_column_is_refused(tmp_path: Path) -> None:
+def test_a_missing_row_beside_a_time_column_is_rejected(tmp_path: Path) -> None:
     lines = written.cwb([["1.0", "2.0", "3.0"]] * 12, 100).splitlines(keepends=True)
     del lines[-5]
     path = tmp_path / "record"

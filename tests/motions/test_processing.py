@@ -108,7 +108,7 @@ def test_taper_is_a_cosine_at_both_ends() -> None:
         (processed(GroundMotion(ordinary(), DT_S)), {}, "already processed"),
     ],
 )
-def test_refused(motion: GroundMotion, settings: dict[str, float], words: str) -> None:
+def test_rejected(motion: GroundMotion, settings: dict[str, float], words: str) -> None:
     with pytest.raises(InputError, match=words):
         processed(motion, HighPass(**settings))  # type: ignore[arg-type]
 
@@ -118,7 +118,7 @@ def test_refused(motion: GroundMotion, settings: dict[str, float], words: str) -
     [{"corner_hz": 0.0}, {"corner_hz": math.nan}, {"order": 0}, {"order": 9},
      {"padding_s": -1.0}, {"taper_s": math.inf}],
 )  # fmt: skip
-def test_settings_refused(settings: dict[str, float]) -> None:
+def test_settings_rejected(settings: dict[str, float]) -> None:
     with pytest.raises(InputError, match=next(iter(settings))):
         HighPass(**settings)  # type: ignore[arg-type]
 
@@ -161,7 +161,7 @@ def test_the_leading_words_say_whether_it_is_corrected(
         (None, "", "by hand", "begin with one of corrected"),
     ],
 )
-def test_other_words_and_contradictions_are_refused(
+def test_other_words_and_contradictions_are_rejected(
     is_corrected: bool | None, stated: str, confirmed: str, reason: str
 ) -> None:
     motion = GroundMotion(np.ones(3), DT_S, is_corrected=is_corrected)

@@ -1,4 +1,4 @@
-"""What is written comes back to the printed digit; what is damaged is refused, never misread."""
+"""What is written comes back to the printed digit; what is damaged is rejected, never misread."""
 
 from __future__ import annotations
 

@@ -235,16 +235,16 @@ def test_nothing_drives() -> None:
 
 
 @pytest.mark.parametrize("bad", [0.0, -1.0, math.nan, math.inf, "three", [1.0, math.nan]])
-def test_bad_p2_is_refused(bad: object) -> None:
+def test_bad_p2_is_rejected(bad: object) -> None:
     with pytest.raises(InputError, match="p2"):
         toppling_spectrum(rectangle(0.5, 0.3), bad)  # type: ignore[call-overload]
 
 
-def test_bad_polarity_is_refused() -> None:
+def test_bad_polarity_is_rejected() -> None:
     with pytest.raises(InputError, match="polarity"):
         toppling_spectrum(rectangle(0.5, 0.3), 1.0, "both")  # type: ignore[arg-type]
 
 
-def test_too_large_to_compute_is_refused() -> None:
+def test_too_large_to_compute_is_rejected() -> None:
     with pytest.raises(InputError, match="too large"):
         toppling_spectrum(GroundMotion([0.0, 1e308, 1e308], 1e3), 1e-10)

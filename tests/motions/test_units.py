@@ -24,7 +24,7 @@ def test_spellings(spelling: str, unit: str) -> None:
 
 
 @pytest.mark.parametrize("spelling", ["", "m/s", "cm/s", "g/10", "counts", "gram", "mgal", "%g"])
-def test_anything_else_is_refused(spelling: str) -> None:
+def test_anything_else_is_rejected(spelling: str) -> None:
     with pytest.raises(InputError, match="use one of g, m/s2, cm/s2, mm/s2") as caught:
         acceleration_unit(spelling)
     assert repr(spelling) in str(caught.value)

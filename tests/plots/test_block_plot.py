@@ -103,7 +103,7 @@ def test_a_locked_block_shows_its_weight(tmp_path, caught):
     assert "locked" in figures[0].get_suptitle()
 
 
-def test_a_path_that_cannot_be_written_is_refused(tmp_path):
+def test_a_path_that_cannot_be_written_is_rejected(tmp_path):
     block, conditions = TOPPLE
     with pytest.raises(InputError, match="plot file"):
         plot_block(block, stability(block, **conditions), tmp_path / "a.jpg")

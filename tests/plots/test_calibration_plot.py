@@ -41,7 +41,7 @@ def test_calibration_shows_shares_and_counts(tmp_path, caught, overlapping) -> N
     assert overlapping(figures[0], [*texts, *figures[0].legends[0].get_texts()]) == []
 
 
-def test_calibration_of_too_many_is_refused(tmp_path) -> None:
+def test_calibration_of_too_many_is_rejected(tmp_path) -> None:
     with pytest.raises(InputError, match="5 models"):
         plot_calibration(dict.fromkeys("abcde", BINS), tmp_path / "c.png")
 
@@ -61,7 +61,7 @@ def test_vertical_shows_every_pair(tmp_path, caught, overlapping) -> None:
     assert overlapping(figures[0], [*texts, axes.yaxis.label, beside.yaxis.label]) == []
 
 
-def test_vertical_without_pairs_is_refused(tmp_path) -> None:
+def test_vertical_without_pairs_is_rejected(tmp_path) -> None:
     without = critical_values()
     none = replace(without, status=np.full(N, "below_limit", dtype=object))
     with pytest.raises(InputError, match="run  rbfrag simulate  for both"):

@@ -30,7 +30,7 @@ def test_the_suffix_chooses_the_format_and_nothing_else_stays(figure, tmp_path, 
 
 
 @pytest.mark.parametrize("name", ["figure", "figure.jpg", "figure.gif", "none/figure.png"])
-def test_paths_that_cannot_be_written_are_refused(figure, tmp_path, name):
+def test_paths_that_cannot_be_written_are_rejected(figure, tmp_path, name):
     with pytest.raises(InputError, match="plot file"):
         save_figure(figure, tmp_path / name)
     assert list(tmp_path.iterdir()) == []

@@ -82,6 +82,6 @@ def test_shading_starts_where_the_fit_ends(tmp_path, caught) -> None:
         assert near < 1e-12, (edge, edges)
 
 
-def test_bad_path_is_refused(tmp_path) -> None:
+def test_bad_path_is_rejected(tmp_path) -> None:
     with pytest.raises(InputError, match=r"\.jpg"):
         plot_chart(straight_line_model(), tmp_path / "c.jpg")

@@ -96,7 +96,7 @@ def test_a_film_as_mp4(slump: Response, tmp_path: Path) -> None:
     assert (np.abs(first[scene] - later[scene]) > 20.0).mean() > 0.005
 
 
-def test_without_ffmpeg_a_film_as_mp4_is_refused_with_the_remedy(
+def test_without_ffmpeg_a_film_as_mp4_is_rejected_with_the_remedy(
     slump: Response, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("PATH", str(tmp_path))
@@ -126,7 +126,7 @@ def test_an_ffmpeg_that_fails_is_told(
         ("film.gif", 0.0, "exaggerate = 0"),
     ],
 )
-def test_refused(slump: Response, tmp_path: Path, name: str, exaggerate: float, word: str) -> None:
+def test_rejected(slump: Response, tmp_path: Path, name: str, exaggerate: float, word: str) -> None:
     with pytest.raises(InputError, match=word):
         film(slump, BLOCK, tmp_path / name, beta_deg=0.0, exaggerate=exaggerate)
     assert not list(tmp_path.iterdir())

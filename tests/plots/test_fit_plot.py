@@ -193,7 +193,7 @@ def test_logarithmic_axes_show_every_block(table, model, tmp_path, drawn):
     assert sum(patch.get_width() for patch in beside.patches) == 360
 
 
-def test_nothing_to_draw_is_refused(table, model, tmp_path):
+def test_nothing_to_draw_is_rejected(table, model, tmp_path):
     empty = replace(table, status=np.full(N, "below_limit", dtype=object))
     with pytest.raises(InputError, match="no critical value"):
         plot_fit(empty, model, tmp_path / "fit.png")
@@ -205,7 +205,7 @@ def test_nothing_to_draw_is_refused(table, model, tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_models_of_other_blocks_are_refused(table, tmp_path):
+def test_models_of_other_blocks_are_rejected(table, tmp_path):
     row = ModelRow(
         name="slumps", kind="slumping", term="pgv_pga", method="capacity",
         coefficients={"b0": 1.0, "b_ln_excess": 3.0, "b_ln_z": 2.5, "b_ln_k": 1.2},

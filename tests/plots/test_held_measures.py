@@ -1,4 +1,4 @@
-"""What charts of more than one measure hold: said, refused, and the answers of predict."""
+"""What charts of more than one measure hold: said, rejected, and the answers of predict."""
 
 from __future__ import annotations
 
@@ -109,7 +109,7 @@ def test_no_line_reaches_what_pga_cannot_lift() -> None:
         ),
     ],
 )
-def test_what_cannot_be_held_is_refused(model, given, words) -> None:
+def test_what_cannot_be_held_is_rejected(model, given, words) -> None:
     with pytest.raises(InputError, match=words):
         held_measures(model, **given)
 

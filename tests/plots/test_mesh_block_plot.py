@@ -61,7 +61,7 @@ def test_axes_are_named_as_in_the_file_and_what_falls_is_left_out(tmp_path, caug
     assert "contacts within 20 mm" in labels
 
 
-def test_a_path_that_cannot_be_written_is_refused(tmp_path):
+def test_a_path_that_cannot_be_written_is_rejected(tmp_path):
     path = write_obj(tmp_path / "a.obj", cut_ellipsoid((0.3, 0.3, 0.4), 0.7, 6))
     with pytest.raises(InputError, match="plot file"):
         plot_mesh_block(rbfrag.block_from_mesh(path), tmp_path / "a.jpg")

@@ -132,7 +132,7 @@ def test_a_few_blocks_are_points_and_many_a_histogram(tmp_path, caught):
         ({"phi_deg": 35.0, "alpha1_deg": [1.0, 2.0], "alpha3_deg": [3.0]}, "equal length"),
     ],
 )
-def test_refusals_leave_no_file(changes, words, tmp_path):
+def test_rejections_leave_no_file(changes, words, tmp_path):
     with pytest.raises(InputError, match=words):
         plot_modes(tmp_path / "a.png", **changes)
     assert list(tmp_path.iterdir()) == []

@@ -13,14 +13,14 @@ from matplotlib import rc_context
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 import rbfrag
-from rbfrag.fragility.lookup import SHIPPED, data_name
+from rbfrag.fragility.model_selection import SHIPPED, data_name
 from rbfrag.hazards.curve import HazardCurve
 from rbfrag.plots.report import sheet
 from rbfrag.plots.report.contents import RateQuestion, contents_of, report_of
 from rbfrag.results.numbers import percent, return_period
-from tests.cli.conftest import Refuses, Shell, refuses, shell
+from tests.cli.conftest import Rejects, Shell, rejects, shell
 
-__all__ = ["refuses", "shell"]
+__all__ = ["rejects", "shell"]
 
 ROCK = rbfrag.Block.rectangle(2.4, 0.5)
 SLIDES = {
@@ -106,12 +106,12 @@ def test_a_table_becomes_one_document(shell: Shell) -> None:
     assert any("the curve is of RotD50" in text for text in notes)
 
 
-def test_a_table_that_makes_no_document(refuses: Refuses) -> None:
+def test_a_table_that_makes_no_document(rejects: Rejects) -> None:
     Path("blocks.csv").write_text(TABLE)
     asked = ("report", "blocks.csv", "--pgv", "0.5", "--out")
-    assert "require .pdf or .html" in refuses(*asked, "a.png")
+    assert "require .pdf or .html" in rejects(*asked, "a.png")
     Path("blocks.csv").write_text("height [m],width [m],pgv [m/s]\n1,x,0.5\n")
-    assert "'x' is not a number" in refuses("report", "blocks.csv", "--out", "a.pdf")
+    assert "'x' is not a number" in rejects("report", "blocks.csv", "--out", "a.pdf")
     assert not list(Path().glob("a.*"))
 
 
@@ -151,8 +151,8 @@ def test_a_page_needs_nothing_but_itself(tmp_path: Path) -> None:
         (("--height", "1", "--width", "2", "--phi", "30", "--pgv", "0.6"), "give --displacement"),
     ],
 )
-def test_bad_questions_leave_no_file(refuses: Refuses, asked: tuple[str, ...], words: str) -> None:
-    assert words in refuses("report", *asked, "--out", "a.pdf")
+def test_bad_questions_leave_no_file(rejects: Rejects, asked: tuple[str, ...], words: str) -> None:
+    assert words in rejects("report", *asked, "--out", "a.pdf")
     assert not list(Path().iterdir())
 
 
@@ -207,8 +207,8 @@ def test_a_report_has_the_limit_state_and_the_level_that_are_asked_for(tmp_path:
     assert any("80 % confidence" in value for _, value in found.summary)
 
 
-def test_a_path_of_another_kind_is_refused(refuses: Refuses) -> None:
-    assert ".docx" in refuses("report", *SHAPE, "--out", "a.docx")
+def test_a_path_of_another_kind_is_rejected(rejects: Rejects) -> None:
+    assert ".docx" in rejects("report", *SHAPE, "--out", "a.docx")
 
 
 @pytest.mark.parametrize(

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from rbfrag.errors import InputError
-from rbfrag.hazards.answer import hazard
 from rbfrag.hazards.curve import hazard_curve
+from rbfrag.hazards.hazard_rates import hazard
 from rbfrag.hazards.loss_answer import Exceedance
 from rbfrag.plots import hazard as hazard_module
 from rbfrag.plots import losses as losses_module
@@ -62,7 +62,7 @@ def test_every_axis_of_losses_has_numbers_and_a_unit(values, tmp_path, caught):
     assert "less than once in 1,000 years" in words
 
 
-def test_losses_without_a_curve_are_refused(tmp_path):
+def test_losses_without_a_curve_are_rejected(tmp_path):
     nothing = reached(())
     with pytest.raises(InputError, match="no curve to draw"):
         plot_losses(nothing, tmp_path / "a.png")

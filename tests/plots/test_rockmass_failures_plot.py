@@ -66,6 +66,6 @@ def test_one_scale_has_bars_alone(tmp_path, caught):
     assert len(figures[0].axes) == 1
 
 
-def test_a_path_that_cannot_be_written_is_refused(tmp_path):
+def test_a_path_that_cannot_be_written_is_rejected(tmp_path):
     with pytest.raises(InputError, match="plot file"):
         plot_failures(shaken([1.0]), tmp_path / "none" / "a.png")

@@ -74,6 +74,6 @@ def test_four_modes_fit_side_by_side(tmp_path, caught, overlapping):
     assert overlapping(figures[0], [*bars.texts, *bars.get_xticklabels()]) == []
 
 
-def test_a_path_that_cannot_be_written_is_refused(made, tmp_path):
+def test_a_path_that_cannot_be_written_is_rejected(made, tmp_path):
     with pytest.raises(InputError, match="plot file"):
         plot_rockmass(made, tmp_path / "none" / "a.png")

@@ -22,7 +22,7 @@ from rbfrag.fragility.measures import AMPLIFIED
 from rbfrag.fragility.prediction import Prediction
 from rbfrag.hazards.curve import hazard_curve
 from rbfrag.hazards.curve_file import hazard_curves_in
-from rbfrag.hazards.shaking import LevelShaking
+from rbfrag.hazards.shaking import HazardLevel
 from rbfrag.question.components import (
     COMPONENT_SIGMA,
     COMPONENTS,
@@ -243,21 +243,21 @@ def test_there_is_no_note_where_the_component_is_known_or_does_not_matter(
 def test_a_curve_file_that_names_its_component_is_believed(text: str) -> None:
     (curve,) = hazard_curves_in(text, "curve.csv")
     assert curve.component == "rotd100"
-    shaking = LevelShaking.of(curve)
+    shaking = HazardLevel.of(curve)
     assert shaking.median == pytest.approx(1.0 / 1.25)
     assert any("RotD100" in note for note in shaking.warnings)
-    assert LevelShaking.of(curve, component="single").median == 1.0
+    assert HazardLevel.of(curve, component="single").median == 1.0
     (unnamed,) = hazard_curves_in(text.replace("omponent", "omment"), "curve.csv")
     assert unnamed.component == ""
-    (note,) = (n for n in LevelShaking.of(unnamed).warnings if isinstance(n, Diagnostic))
+    (note,) = (n for n in HazardLevel.of(unnamed).warnings if isinstance(n, Diagnostic))
     assert note.code == "single_component"
 
 
 def test_a_spectral_curve_is_converted_at_its_own_period() -> None:
     curve = hazard_curve("sa_g", [0.1, 1.0], [1e-2, 1e-4], period_s=0.5)
     about = {"convert": "bommer_alarcon_2006", "convert_sigma": 0.3}
-    found = LevelShaking.of(curve, component="rotd100", **about)  # type: ignore[arg-type]
-    single = LevelShaking.of(curve, component="single", **about)  # type: ignore[arg-type]
+    found = HazardLevel.of(curve, component="rotd100", **about)  # type: ignore[arg-type]
+    single = HazardLevel.of(curve, component="single", **about)  # type: ignore[arg-type]
     assert found.median == pytest.approx(single.median / 1.23)
 
 

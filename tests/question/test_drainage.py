@@ -18,9 +18,9 @@ from rbfrag.fragility.prediction_array import PredictionArray
 from rbfrag.results.diagnostic import codes_by_row
 from rbfrag.service.app import make_app
 from rbfrag.service.settings import ServiceSettings
-from tests.cli.conftest import Refuses, Shell, refuses, shell
+from tests.cli.conftest import Rejects, Shell, rejects, shell
 
-__all__ = ["refuses", "shell"]
+__all__ = ["rejects", "shell"]
 
 BOUND = ("probability", "ci_low", "ci_high")
 TOPPLE: dict[str, Any] = {
@@ -183,10 +183,10 @@ def test_rates_have_the_drained_bound(shell: Shell) -> None:
     }
 
 
-def test_a_drainage_without_water_or_of_another_name_is_rejected(refuses: Refuses) -> None:
+def test_a_drainage_without_water_or_of_another_name_is_rejected(rejects: Rejects) -> None:
     words = ("predict", "--height", "4", "--width", "2", "--phi", "40", "--pgv", "0.5")
-    assert "--drainage requires --water" in refuses(*words, "--drainage", "drained")
-    assert "it must be undrained or drained" in refuses(*words, "--water", "1", "--drainage", "no")
+    assert "--drainage requires --water" in rejects(*words, "--drainage", "drained")
+    assert "it must be undrained or drained" in rejects(*words, "--water", "1", "--drainage", "no")
     with pytest.raises(InputError, match="water_m"):
         rbfrag.predict(**{**TOPPLE, "height_m": [4.0, 4.0]}, drainage="drained")
     arrays = rbfrag.predict(**TOPPLE, water_m=[1.0, 1.0], drainage=["no", ""])

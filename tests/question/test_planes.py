@@ -39,7 +39,7 @@ def test_section(base, back, face, s1, s2, beta, gamma, s1_in, s2_in, says) -> N
     assert [says in text for text in said] == ([True] if says else [])
 
 
-def test_wedge_is_refused() -> None:
+def test_wedge_is_rejected() -> None:
     base, back, face = Plane(35.0, 140.0), Plane(60.0, 50.0), Plane(70.0, 90.0)
     assert base.trace_deg(90.0) == pytest.approx(24.2318, abs=5e-5)
     assert back.trace_deg(90.0) - base.trace_deg(90.0) == pytest.approx(28.7637, abs=5e-5)
@@ -70,7 +70,7 @@ def test_line_lies_in_both_planes() -> None:
         ("25-102", "70/090", "80/090", "not dip/dip direction"),
     ],
 )
-def test_refusals(base: str, back: str, face: str, why: str) -> None:
+def test_rejections(base: str, back: str, face: str, why: str) -> None:
     with pytest.raises(InputError, match=why):
         in_section({"base": base, "back": back, "face": face, "s1_m": 1.0, "s2_m": 1.0})
 

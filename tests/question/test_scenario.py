@@ -163,6 +163,6 @@ def test_a_table_of_another_model(tmp_path: Path) -> None:
         ({"rjb_km": np.array([10.0, 500.0])}, "rjb_km = 500"),
     ],
 )
-def test_what_is_no_scenario_is_refused(changed: dict[str, object], text: str) -> None:
+def test_what_is_no_scenario_is_rejected(changed: dict[str, object], text: str) -> None:
     with pytest.raises(InputError, match=text):
         ask(**{**S1, **changed})

@@ -1,4 +1,4 @@
-"""Headers of tables: the field and the unit that a column states, what is refused, what is said."""
+"""Headers of tables: names, units and duplicates; unknown columns are rejected by name."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ def test_no_name_stands_for_two_fields() -> None:
         (["PGA (knots)"], "'knots'"),
     ],
 )
-def test_what_cannot_be_meant_is_refused(header: list[str], words: str) -> None:
+def test_what_cannot_be_meant_is_rejected(header: list[str], words: str) -> None:
     with pytest.raises(InputError, match=words.replace("(", r"\(")):
         columns_in(header, "blocks.csv", COLUMNS)
 
@@ -183,9 +183,9 @@ def test_rows_slide_where_stability_says_so(width: float, beta: float) -> None:
     }
     rows = read_blocks(columns)
     if judged.mode == "slide" and judged.yield_acceleration > 0.0:
-        assert "slides" in rows.refused["reason"][0]
+        assert "slides" in rows.rejected["reason"][0]
     elif judged.yield_acceleration <= 0.0:
-        assert "unstable" in rows.refused["reason"][0]
+        assert "unstable" in rows.rejected["reason"][0]
     else:
-        assert rows.refused_count == 0
+        assert rows.rejected_count == 0
         assert rows.blocks["kr"][0] == pytest.approx(judged.kr, rel=1e-12)

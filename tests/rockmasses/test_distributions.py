@@ -1,4 +1,4 @@
-"""Each law against scipy's, its truncation, and what is refused."""
+"""Each law against scipy's, its truncation, and what is rejected."""
 
 from __future__ import annotations
 
@@ -114,7 +114,7 @@ def test_a_constant_is_a_number_or_a_table() -> None:
         ("weibull", {"mean": 1.0}, "distribution = 'weibull' is unknown: use one of constant"),
     ],
 )
-def test_refusals_name_the_key(name: str, keys: dict[str, object], words: str) -> None:
+def test_rejections_name_the_key(name: str, keys: dict[str, object], words: str) -> None:
     with pytest.raises(InputError, match=words):
         law(name, **keys)
 
@@ -124,7 +124,7 @@ def test_a_length_is_not_on_a_circle() -> None:
         Distribution.of({"distribution": "von_mises", "mean": 1.0, "kappa": 1.0}, angle=False)
 
 
-def test_a_table_without_its_law_is_refused() -> None:
+def test_a_table_without_its_law_is_rejected() -> None:
     with pytest.raises(InputError, match="key distribution is missing"):
         Distribution.of({"mean": 1.0, "sd": 1.0}, angle=False)
     with pytest.raises(InputError, match="'20' is not a number"):

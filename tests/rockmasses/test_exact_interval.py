@@ -35,6 +35,6 @@ def test_none_of_many() -> None:
 
 
 @pytest.mark.parametrize("level", [0.0, 1.0, -1.0, float("nan")])
-def test_refused(level: float) -> None:
+def test_rejected(level: float) -> None:
     with pytest.raises(InputError, match="level"):
         exact_interval(1, 2, level)

@@ -238,7 +238,7 @@ class TestImpossible:
         assert 100 < int(sliver.sum()) < 300
         assert np.all(found.s2_m[sliver] == 1e-20)
 
-    def test_no_block_at_all_is_refused_with_the_reasons(self) -> None:
+    def test_no_block_at_all_is_rejected_with_the_reasons(self) -> None:
         with pytest.raises(InputError, match=r"none of 50 realisations is a block: 50 times gamma"):
             mass(back__dip_deg=10.0, base__dip_deg=15.0).realise(50)
 
@@ -287,7 +287,7 @@ class TestRefusals:
             max_leaves=6,
         ),
     )
-    def test_anything_else_is_refused_in_words(self, key: str, value: object) -> None:
+    def test_anything_else_is_rejected_in_words(self, key: str, value: object) -> None:
         with contextlib.suppress(InputError):
             mass = RockMass.of({**TABLE_3_4, key: value})
             assert mass.realise(20).n == 20

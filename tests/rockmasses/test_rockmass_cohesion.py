@@ -1,4 +1,4 @@
-"""Rock masses whose bases have cohesion: the exact yield of each block, and what is refused."""
+"""Rock masses whose bases have cohesion: the exact yield of each block, and what is rejected."""
 
 from __future__ import annotations
 
@@ -161,7 +161,7 @@ def test_a_chart_of_modes_says_that_it_knows_no_cohesion(tmp_path: Path) -> None
         ("cohesion_pa = 1\n[block]\ndensity_kg_m3 = 0\n", "give above 0"),
     ],
 )
-def test_refused(text: str, words: str) -> None:
+def test_rejected(text: str, words: str) -> None:
     with pytest.raises(InputError, match=words):
         rock_mass_of_toml(TOML + text)
 

@@ -129,7 +129,7 @@ def test_planes_in_both_forms(tmp_path: Path) -> None:
         ("[friction]", "[[friction]]", "friction = .* is not a table"),
     ],
 )
-def test_toml_refusals(tmp_path: Path, old: str, new: str, words: str) -> None:
+def test_toml_rejections(tmp_path: Path, old: str, new: str, words: str) -> None:
     assert old in TOML
     path = written(tmp_path, "bad.toml", TOML.replace(old, new, 1))
     with pytest.raises(InputError, match=f"bad.toml: {words}"):
@@ -152,7 +152,7 @@ def test_toml_refusals(tmp_path: Path, old: str, new: str, words: str) -> None:
         ("block.back_fracture,,false", "block.back_fracture,,0", "block.back_fracture = 0"),
     ],
 )
-def test_csv_refusals(tmp_path: Path, old: str, new: str, words: str) -> None:
+def test_csv_rejections(tmp_path: Path, old: str, new: str, words: str) -> None:
     assert old in CSV
     path = written(tmp_path, "bad.csv", CSV.replace(old, new, 1))
     with pytest.raises(InputError, match=f"bad.csv: {words}"):

@@ -109,7 +109,7 @@ def test_no_shaking_moves_nothing_that_stands() -> None:
     assert np.all(still.probability[stands] == 0.0)
 
 
-def test_what_the_models_lack_is_refused() -> None:
+def test_what_the_models_lack_is_rejected() -> None:
     with pytest.raises(InputError, match="displacement_m"):
         scenario(MADE, {"pgv_m_s": 0.6}, displacement_m=0.0)
     without = scenario(MADE, {"pgv_m_s": 0.6})

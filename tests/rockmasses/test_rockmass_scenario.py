@@ -133,19 +133,19 @@ def test_no_model_is_looked_up_where_no_block_needs_one(tmp_path: Path) -> None:
         ({"pga_g": 0.4}, "pgv_m_s"),
     ],
 )
-def test_refusals(
+def test_rejections(
     made: Realisations, model: FragilityModel, measures: dict[str, float], words: str
 ) -> None:
     with pytest.raises(InputError, match=words):
         scenario(made, measures, model=model)
 
 
-def test_a_level_that_is_none_is_refused(made: Realisations, model: FragilityModel) -> None:
+def test_a_level_that_is_none_is_rejected(made: Realisations, model: FragilityModel) -> None:
     with pytest.raises(InputError, match=r"level = 1\.0"):
         scenario(made, {"pgv_m_s": 0.4}, model=model, level=1.0)
 
 
-def test_vertical_acceleration_of_the_file_is_refused(model: FragilityModel) -> None:
+def test_vertical_acceleration_of_the_file_is_rejected(model: FragilityModel) -> None:
     made = RockMass.of({**WILD, "block.kv": 0.1}).realise(100, 1)
     with pytest.raises(InputError, match=r"block\.kv is not supported"):
         scenario(made, {"pgv_m_s": 0.4}, model=model)

@@ -42,7 +42,7 @@ FOUR_MODES = RockMass.of(DESCRIPTION)
 WATER = {"back.water_m": {**UNIFORM, "low": 0.0, "high": 0.6}, "block.density_kg_m3": 2600.0}
 
 
-def one_block(**stated: object) -> Realisations:
+def classify_block(**stated: object) -> Realisations:
     """A rock mass of three blocks that are all alike."""
     return RockMass.of(
         {
@@ -74,7 +74,7 @@ def shake(made: Realisations, motion: GroundMotion, chunk: int = 50, **asked: ob
 
 def test_sliding_blocks_by_hand() -> None:
     # D = factor (A g T²/2) (A/k_y - 1) on a base of 20 degrees with 30 degrees of friction
-    made = one_block()
+    made = classify_block()
     ky = math.tan(math.radians(10.0))
     factor = math.cos(math.radians(10.0)) / math.cos(math.radians(30.0))
     slid = factor * 0.5 * 0.4 * G * 0.2**2 * (0.4 / ky - 1.0)
@@ -95,7 +95,7 @@ def test_sliding_blocks_by_hand() -> None:
 
 
 def test_scales_are_factors_on_the_motion() -> None:
-    made = one_block()
+    made = classify_block()
     found = shake(made, pulse(0.4, 0.2), scales=[2.0, 0.4, 1.0, 0.4])
     assert found.shaking.scales == (0.4, 1.0, 2.0)
     assert found.pga_g.tolist() == pytest.approx([0.16, 0.4, 0.8])
@@ -209,11 +209,11 @@ def test_a_stated_rotation_is_failure_before_recovery_is_lost(four: ShakenMass) 
 def test_thrown_off_by_the_vertical_motion() -> None:
     up = GroundMotion(np.array([0.0, 0.0, -2.0, 0.0]), 0.1)
     motion = GroundMotion(np.array([0.0, 0.9, 0.9, 0.0]), 0.1)
-    thrown = shake(one_block(), motion, vertical=up)
+    thrown = shake(classify_block(), motion, vertical=up)
     assert thrown.code[0].tolist() == [OUTCOMES.index("jump")] * 3
     # the strength is not passed, and yet the block does not stay
     weak = shake(
-        one_block(), replace(motion, acceleration_g=0.1 * motion.acceleration_g), vertical=up
+        classify_block(), replace(motion, acceleration_g=0.1 * motion.acceleration_g), vertical=up
     )
     assert weak.code[0].tolist() == [OUTCOMES.index("jump")] * 3
     assert weak.runs == 0
@@ -245,24 +245,24 @@ def test_the_table_has_a_row_for_each_block_and_scale(four: ShakenMass) -> None:
         ({"scales": []}, "no scale"),
     ],
 )
-def test_refused(asked: dict[str, object], word: str) -> None:
+def test_rejected(asked: dict[str, object], word: str) -> None:
     with pytest.raises(InputError, match=word):
-        plan_shaking(one_block(), pulse(0.4, 0.2), **asked)  # type: ignore[arg-type]
+        plan_shaking(classify_block(), pulse(0.4, 0.2), **asked)  # type: ignore[arg-type]
 
 
-def test_more_than_the_memory_holds_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_more_than_the_memory_holds_is_rejected(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(rockmass_shaken, "MOST_OUTCOMES", 5)
     with pytest.raises(InputError, match="3 realisations at 2 scales are more than 5"):
-        plan_shaking(one_block(), pulse(0.4, 0.2), scales=[1.0, 2.0])
+        plan_shaking(classify_block(), pulse(0.4, 0.2), scales=[1.0, 2.0])
 
 
-def test_impossible_limits_are_refused() -> None:
+def test_impossible_limits_are_rejected() -> None:
     with pytest.raises(InputError, match="displacement"):
         FailureLimits(0.0)
     with pytest.raises(InputError, match="rotation"):
         FailureLimits(0.05, -1.0)
 
 
-def test_a_vertical_acceleration_of_the_mass_is_refused() -> None:
+def test_a_vertical_acceleration_of_the_mass_is_rejected() -> None:
     with pytest.raises(InputError, match=r"block\.kv"):
-        plan_shaking(one_block(**{"block.kv": 0.1}), pulse(0.4, 0.2))
+        plan_shaking(classify_block(**{"block.kv": 0.1}), pulse(0.4, 0.2))

@@ -256,7 +256,7 @@ def test_what_does_not_stand_after_its_first_slip_fails() -> None:
         ({"back.water_m": -1.0}, "back.water_m: -1 is out of range"),
     ],
 )
-def test_refusals(changes: dict[str, object], words: str) -> None:
+def test_rejections(changes: dict[str, object], words: str) -> None:
     description = {k: v for k, v in {**WET_SLIDE, **changes}.items() if v is not None}
     with pytest.raises(InputError, match=words):
         RockMass.of(description)

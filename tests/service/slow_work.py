@@ -15,7 +15,7 @@ def sleep(seconds):
     return b"awake"
 
 
-def refuse(words):
+def reject(words):
     raise InputError(words)
 
 

@@ -48,7 +48,7 @@ def stays_up(service):
     assert status == 200, text
 
 
-def refused(found, status):
+def rejected(found, status):
     assert found[0] == status, found
     problem = json.loads(found[1])
     assert problem["status"] == status
@@ -127,7 +127,7 @@ def test_trickling_bodies_do_not_keep_others_waiting_for_long(service):
         b"POST /v1/predict HTTP/1.1\r\nhost: localhost\r\ntransfer-encoding: chunked\r\n\r\nzz\r\n",
     ],
 )
-def test_what_is_not_http_is_refused(service, sent):
+def test_what_is_not_http_is_rejected(service, sent):
     with socket.create_connection(("127.0.0.1", service.port), 20) as wire:
         wire.sendall(sent)
         wire.shutdown(socket.SHUT_WR)
@@ -150,8 +150,8 @@ def test_what_is_not_http_is_refused(service, sent):
     ],
     ids=["empty", "bytes", "cut", "lists", "objects", "nan", "infinity", "digits"],
 )
-def test_what_is_not_json_is_refused(service, body, words):
-    assert words in refused(ask(service, "POST", "/v1/predict", body), 400)
+def test_what_is_not_json_is_rejected(service, body, words):
+    assert words in rejected(ask(service, "POST", "/v1/predict", body), 400)
 
 
 @pytest.mark.parametrize(
@@ -169,7 +169,7 @@ def test_what_is_not_json_is_refused(service, body, words):
 )
 def test_values_of_any_kind_are_answered(service, body, words):
     found = ask(service, "POST", "/v1/predict", json.dumps(body).encode())
-    assert words in refused(found, 422)
+    assert words in rejected(found, 422)
 
 
 @pytest.mark.parametrize("value", ["nan", "inf", "-inf", "1e999", "1e-999", "-0", "0x10", "١"])
@@ -199,14 +199,14 @@ NAMES = [
 def test_names_are_only_names(service, name):
     listed = ask(service, "GET", "/v1/models")[1]
     query = urllib.parse.urlencode({"p2": 3, "kr": 0.1, "pgv": 0.6, "model": name})
-    detail = refused(ask(service, "GET", f"/v1/predict?{query}"), 422)
+    detail = rejected(ask(service, "GET", f"/v1/predict?{query}"), 422)
     assert "there is no model" in detail
     assert "root:" not in detail
     sent = ask(
         service, "POST", f"/v1/hazard?{query.replace('model', 'site')}".replace("pgv=0.6&", ""),
         b"pgv_m_s,annual_rate\n0.1,0.01\n1,0.0001\n",
     )  # fmt: skip
-    assert "there is no site" in refused(sent, 422)
+    assert "there is no site" in rejected(sent, 422)
     assert ask(service, "GET", "/v1/models")[1] == listed
 
 
@@ -235,12 +235,12 @@ def test_the_name_of_a_file_that_is_sent_means_nothing(service, name):
     ],
     ids=["empty", "field", "two", "none", "headers"],
 )
-def test_a_form_that_holds_no_single_file_is_refused(service, body):
+def test_a_form_that_holds_no_single_file_is_rejected(service, body):
     headers = {"content-type": "multipart/form-data; boundary=mark"}
-    assert refused(ask(service, "POST", "/v1/spectrum?p2=3", body.encode(), headers), 400)
+    assert rejected(ask(service, "POST", "/v1/spectrum?p2=3", body.encode(), headers), 400)
 
 
-def test_headers_without_end_are_refused(service):
+def test_headers_without_end_are_rejected(service):
     with socket.create_connection(("127.0.0.1", service.port), 20) as wire:
         wire.sendall(b"GET /v1/healthz HTTP/1.1\r\n")
         sent = 0

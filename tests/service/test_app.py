@@ -21,7 +21,7 @@ def test_a_block_is_answered_as_by_the_command_line(client, shell: Shell):
 @pytest.mark.parametrize(
     "query", ["s1=1&s2=0.6&beta=20&phi=40", "beta=20&phi=40", "s1=1&s2=0.6&gamma=25&phi=40"]
 )
-def test_a_block_that_is_not_described_is_refused(client, query):
+def test_a_block_that_is_not_described_is_rejected(client, query):
     answer = client.get(f"/v1/block?{query}")
     assert answer.status_code == 422
     assert "--" not in answer.json()["detail"]

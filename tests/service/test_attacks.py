@@ -86,7 +86,7 @@ def test_a_locked_file_holds_nobody_else(service):
     ],
     ids=["deep", "many", "long", "names"],
 )
-def test_a_large_body_is_refused_before_it_is_parsed(service, body):
+def test_a_large_body_is_rejected_before_it_is_parsed(service, body):
     with going_on(ask, service, "POST", "/v1/predict", body) as found:
         for _ in range(10):
             healthy(service)
@@ -172,8 +172,8 @@ def test_bodies_that_are_being_read_hold_bounded_memory(tmp_path):
                 b"POST /v1/predict HTTP/1.1\r\nhost: localhost\r\ncontent-length: 190000\r\n\r\n"
                 + b" " * 150_000
             )
-        (refused,), _, _ = select.select(half_sent, [], [], 60.0)
-        assert refused.recv(10_000).startswith(b"HTTP/1.1 503 ")
+        (rejected,), _, _ = select.select(half_sent, [], [], 60.0)
+        assert rejected.recv(10_000).startswith(b"HTTP/1.1 503 ")
         wires.close()  # and what they held is free again
         end = time.monotonic() + 30.0
         while ask(running, "POST", "/v1/predict", b" " * 150_000 + BODY)[0] != 200:
@@ -229,7 +229,7 @@ def test_a_key_is_there_once(service, path, body, headers):
     assert "occurs twice" in json.loads(text)["detail"]
 
 
-def test_a_refused_upload_is_told_why(service):
+def test_a_rejected_upload_is_told_why(service):
     # http.client sends all of it before it reads; the connection must still be there
     status, _, text = ask(service, "POST", "/v1/spectrum?p2=3", b"1" * 17_000_000)
     assert status == 413

@@ -58,9 +58,9 @@ def test_a_list_of_rectangles_is_answered_as_each_of_them(client):
 
 def test_a_shape_that_slides_is_answered_where_sliding_is_asked_for(client):
     shape = {**ANGLES, "phi": 22, "pgv": 0.6}
-    refused = client.get("/v1/predict", params=shape)
-    assert refused.status_code == 422
-    assert "the block slides (yield 0.07 g): give displacement" in refused.json()["detail"]
+    rejected = client.get("/v1/predict", params=shape)
+    assert rejected.status_code == 422
+    assert "the block slides (yield 0.07 g): give displacement" in rejected.json()["detail"]
     query = {**shape, "kind": "sliding", "displacement": 0.05}
     assert client.get("/v1/predict", params=query).json()["kind"] == "sliding"
 
@@ -79,7 +79,7 @@ def test_a_shape_that_slides_is_answered_where_sliding_is_asked_for(client):
         ("p2=3&kr=0.1&no_back=true", "no_back requires the geometry of a block"),
     ],
 )
-def test_what_is_no_single_block_is_refused(client, query, words):
+def test_what_is_no_single_block_is_rejected(client, query, words):
     answer = client.get(f"/v1/predict?{query}&pgv=0.6")
     assert answer.status_code == 422
     detail = answer.json()["detail"]
@@ -95,7 +95,7 @@ def test_what_is_no_single_block_is_refused(client, query, words):
         ({"height": 2, "width": "0.5", "pgv": 1}, "width = '0.5' is not a number"),
     ],
 )
-def test_a_list_of_what_is_no_rectangle_is_refused(client, body, words):
+def test_a_list_of_what_is_no_rectangle_is_rejected(client, body, words):
     answer = client.post("/v1/predict", json=body)
     assert answer.status_code == 422
     assert words in answer.json()["detail"]

@@ -62,7 +62,7 @@ def test_what_predictions_read_of_a_block_comes_with_its_drawing(client, query, 
         ("s1=1&s2=x&gamma=60&beta=20&phi=30", "s2"),
     ],
 )
-def test_what_is_no_block_is_refused_in_words(client, query, named):
+def test_what_is_no_block_is_rejected_in_words(client, query, named):
     answer = client.get(f"/v1/drawing?{query}")
     assert answer.status_code == 422
     assert named in answer.json()["detail"]

@@ -49,7 +49,7 @@ def written(shell: Shell, tmp_path: Path):
     return write
 
 
-def refusal(answer, status=422):
+def rejection(answer, status=422):
     assert answer.status_code == status, answer.text
     assert answer.headers["content-type"] == "application/problem+json"
     detail = answer.json()["detail"]
@@ -77,15 +77,15 @@ def test_a_rock_mass_is_answered_as_by_the_command_line(client, written, shell: 
         ("", "base = 3\n", "base = 3 is not a table"),
     ],
 )
-def test_a_rock_mass_that_is_none_is_refused(client, query, body, words):
-    assert words in refusal(client.post(f"/v1/rockmass?{query}", content=body, headers=TOML))
+def test_a_rock_mass_that_is_none_is_rejected(client, query, body, words):
+    assert words in rejection(client.post(f"/v1/rockmass?{query}", content=body, headers=TOML))
 
 
 def test_a_rock_mass_says_how_it_is_written(client):
     answer = client.post(
         "/v1/rockmass", content=EXAMPLE_TOML, headers={"content-type": "text/html"}
     )
-    assert "application/toml" in refusal(answer, 415)
+    assert "application/toml" in rejection(answer, 415)
 
 
 @pytest.mark.parametrize("polarity", ["forward", "both"])
@@ -137,9 +137,9 @@ def test_one_trace_of_several_is_asked_for_by_its_number(client, tmp_path):
     motions = [GroundMotion(rng.normal(0.0, 0.1, 400), 0.01, component=c) for c in ("N", "E")]
     export_motions(motions, tmp_path / "two.csv")
     body = (tmp_path / "two.csv").read_bytes()
-    refused = client.post("/v1/spectrum", content=body)
-    assert "holds 2 traces: give one of  0 (N), 1 (E)" in refusal(refused)
-    assert refused.json()["traces"] == ["N", "E"]
+    rejected = client.post("/v1/spectrum", content=body)
+    assert "holds 2 traces: give one of  0 (N), 1 (E)" in rejection(rejected)
+    assert rejected.json()["traces"] == ["N", "E"]
     for i, motion in enumerate(motions):
         found = client.post(f"/v1/spectrum?trace={i}", content=body).json()
         assert found["pgv_m_s"] == motion.pgv_m_s
@@ -159,9 +159,9 @@ def test_one_trace_of_several_is_asked_for_by_its_number(client, tmp_path):
         ("p2=3&dt=-1&units=g", "0.1\n0.2\n", "dt = -1 is not above 0"),
     ],
 )
-def test_an_accelerogram_that_is_none_is_refused(client, query, body, words):
+def test_an_accelerogram_that_is_none_is_rejected(client, query, body, words):
     for path in ("spectrum", "critical"):
-        assert words in refusal(client.post(f"/v1/{path}?{query}", content=body))
+        assert words in rejection(client.post(f"/v1/{path}?{query}", content=body))
 
 
 @pytest.mark.parametrize(
@@ -175,8 +175,8 @@ def test_an_accelerogram_that_is_none_is_refused(client, query, body, words):
         ("p2=nan&kr=0.1", CURVE, "p2"),
     ],
 )
-def test_a_curve_that_is_none_is_refused(client, query, body, words):
-    assert words in refusal(client.post(f"/v1/hazard?{query}", content=body))
+def test_a_curve_that_is_none_is_rejected(client, query, body, words):
+    assert words in rejection(client.post(f"/v1/hazard?{query}", content=body))
 
 
 def test_rows_are_answered_alike_however_many_there_are(client):
@@ -191,9 +191,9 @@ def test_rows_are_answered_alike_however_many_there_are(client):
     assert few["warnings"] == more["warnings"] == most["warnings"]
 
 
-def test_more_rows_than_the_limit_are_refused(client):
+def test_more_rows_than_the_limit_are_rejected(client):
     answer = client.post("/v1/predict", json={"p2": 3.0, "kr": [0.1] * 6001, "pgv": 0.6})
-    assert "the maximum per request is 6000" in refusal(answer)
+    assert "the maximum per request is 6000" in rejection(answer)
 
 
 def test_hazard_answers_for_free_standing_blocks(client):

@@ -85,7 +85,7 @@ def test_a_body_of_rows_is_json_whatever_it_is_called(client, kind):
     assert client.post("/v1/predict", content=body, headers=headers).status_code == 200
 
 
-def test_a_refusal_is_short_whatever_was_asked(client):
+def test_a_rejection_is_short_whatever_was_asked(client):
     for query in (
         "x" * 3000,
         "kr=" + "9" * 3000,

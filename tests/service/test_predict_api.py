@@ -127,7 +127,7 @@ def test_a_list_says_which_element_cannot_be_used(client):
         ("p2=3&kr=%ff&pgv=0.6", "kr = '\N{REPLACEMENT CHARACTER}' is not a number"),
     ],
 )
-def test_what_cannot_be_answered_is_refused_in_words(client, query, words):
+def test_what_cannot_be_answered_is_rejected_in_words(client, query, words):
     answer = client.get(f"/v1/predict?{query}")
     assert answer.status_code == 422
     assert answer.headers["content-type"] == "application/problem+json"

@@ -46,7 +46,7 @@ def test_headers_that_do_not_come_are_given_up(monkeypatch, sent):
     assert b"HTTP/1.1 408 " in answer
 
 
-def test_headers_that_are_too_long_are_refused():
+def test_headers_that_are_too_long_are_rejected():
     with serving() as port, socket.create_connection(("127.0.0.1", port), 20) as wire:
         wire.sendall(b"GET / HTTP/1.1\r\nx: " + b"y" * (protocol.HEADERS_BYTES + 1))
         answer = wire.makefile("rb").read()

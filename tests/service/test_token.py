@@ -67,7 +67,7 @@ def test_this_computer_needs_none(host):
     assert {"localhost", "127.0.0.1", "[::1]"} <= set(settings.allow_host)
 
 
-def test_the_command_refuses_to_start_without_a_token(shell: Shell):
+def test_the_command_rejects_to_start_without_a_token(shell: Shell):
     told = shell("serve", "--host", "0.0.0.0", expect=2).stderr
     assert "RBFRAG_TOKEN" in told
     assert "--token-file" in told
@@ -84,7 +84,7 @@ def test_the_command_refuses_to_start_without_a_token(shell: Shell):
         (["--host", "192.0.2.1"], "a token is required"),
     ],
 )
-def test_the_command_refuses_what_cannot_be(shell: Shell, options, words):
+def test_the_command_rejects_what_cannot_be(shell: Shell, options, words):
     assert words in shell("serve", *options, expect=2).stderr
 
 
@@ -148,7 +148,7 @@ def test_requests_are_counted_by_operation_and_not_by_what_is_asked_for(guarded)
     assert "none-1" not in text
 
 
-def test_an_address_that_somebody_listens_at_is_refused():
+def test_an_address_that_somebody_listens_at_is_rejected():
     with listener("127.0.0.1", 0) as taken:
         port = taken.getsockname()[1]
         with pytest.raises(InputError, match=f"port {port}: .* choose another"):

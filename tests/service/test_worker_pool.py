@@ -45,14 +45,14 @@ def test_work_is_answered(pool):
 
 def test_an_error_on_purpose_comes_back(pool):
     with pytest.raises(InputError, match="kr = -1"):
-        do(pool, slow_work.refuse, "kr = -1 is not above zero")
+        do(pool, slow_work.reject, "kr = -1 is not above zero")
 
 
 def test_work_beyond_the_limit_is_ended(pool):
     start = time.monotonic()
-    with pytest.raises(RequestRefusedError, match="longer than the limit of 3 s") as refused:
+    with pytest.raises(RequestRefusedError, match="longer than the limit of 3 s") as rejected:
         do(pool, slow_work.sleep, 1000.0)
-    assert refused.value.status_code == 422
+    assert rejected.value.status_code == 422
     ready(pool)  # the next piece of work is not kept waiting by it
     assert time.monotonic() - start < 120
     assert do(pool, slow_work.answer, "next") == b"next"
@@ -81,8 +81,8 @@ def test_work_that_waits_too_long_may_be_asked_again(pool):
 
 
 def test_a_process_that_dies_is_replaced(pool):
-    with pytest.raises(RequestRefusedError) as refused:
+    with pytest.raises(RequestRefusedError) as rejected:
         do(pool, slow_work.die)
-    assert refused.value.status_code == 503
+    assert rejected.value.status_code == 503
     ready(pool)
     assert do(pool, slow_work.answer, "again") == b"again"

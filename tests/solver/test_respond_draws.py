@@ -120,6 +120,6 @@ def test_the_interval_of_a_count_is_that_of_wilson() -> None:
         ({"kr": [0.1, 0.2], "weights": [1.0, 1.0, 1.0]}, "one length"),
     ],
 )
-def test_what_is_no_draw_is_refused(given: dict[str, Any], words: str) -> None:
+def test_what_is_no_draw_is_rejected(given: dict[str, Any], words: str) -> None:
     with pytest.raises(InputError, match=words):
         respond_draws(SHAKEN, **{"p2": 7.0, "kr": 0.12, "draws": 5, **given})

@@ -16,7 +16,7 @@ from rbfrag.bench.cases import Records
 from rbfrag.errors import InputError
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.readers import read_motions
-from rbfrag.question.blocks import one_block
+from rbfrag.question.classify import classify_block
 from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.excitation import excitation
 from rbfrag.solver.integrator.free_batch import simulate_free
@@ -360,7 +360,7 @@ def test_the_force_on_the_corner_is_that_of_the_motion_of_the_centroid() -> None
     assert force.friction == pytest.approx(needed, rel=0.01)
 
 
-def test_friction_warns_and_does_not_refuse() -> None:
+def test_friction_warns_and_does_not_reject() -> None:
     motion = GroundMotion(shaking(2), 0.02)
     block = Block.from_angles(-9.0, 9.0, 1.0)
     for phi_deg, slips in ((60.0, False), (12.0, True), (5.0, True)):
@@ -389,7 +389,7 @@ def test_without_a_back_plane_a_block_that_topples_rocks() -> None:
     backed = rbfrag.respond(motion, block=block, back_fracture=False, kind="toppling", **planes)
     assert any("no plane backs the block" in text for text in backed.warnings)
     assert not any("no plane backs" in text for text in alone.warnings)
-    told = one_block({"block": block, **planes, "back_fracture": False}, "toppling").remarks
+    told = classify_block({"block": block, **planes, "back_fracture": False}, "toppling").remarks
     assert any("no plane backs" in text for text in told)
     assert rbfrag.respond(motion, p2=3.0, kr=0.2).kind == "toppling"
     flat = Block.from_fractures(1.0, 2.0, 90.0)
@@ -430,7 +430,7 @@ def test_a_throw_is_reported() -> None:
         ),
     ],
 )  # fmt: skip
-def test_what_no_model_covers_is_refused(given: dict, words: str) -> None:
+def test_what_no_model_covers_is_rejected(given: dict, words: str) -> None:
     motion = GroundMotion(shaking(3), 0.02)
     with pytest.raises(InputError, match=words):
         rbfrag.respond(motion, kind="rocking", **given)

@@ -224,7 +224,7 @@ def test_a_run_from_a_state() -> None:
         (motion(1), {"vertical": [motion(1)]}, "one vertical motion"),
     ],
 )
-def test_what_is_refused(
+def test_what_is_rejected(
     motions: GroundMotion | Sequence[GroundMotion], options: dict[str, Any], word: str
 ) -> None:
     with pytest.raises(InputError, match=word):

@@ -44,7 +44,7 @@ def test_printed_yields(
     assert answer.state == ("unstable" if k < 0.0 else "stable")
 
 
-def test_a_block_that_floats_and_a_fracture_that_spills_are_refused() -> None:
+def test_a_block_that_floats_and_a_fracture_that_spills_are_rejected() -> None:
     top = top_m(2.0, 35.0, 5.0)
     with pytest.raises(InputError, match="floats"):
         wet(2.0, 0.5, 35.0, 5.0, 28.0, top)

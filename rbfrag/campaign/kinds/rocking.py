@@ -22,7 +22,7 @@ from rbfrag.solver.models.rocking import SENSITIVITY, rectangle, restitution_of_
 from rbfrag.solver.quantity import positive
 from rbfrag.solver.results import DEFAULT_P2, FloatArray, SearchPoints
 from rbfrag.solver.rocking_run import MOST_IMPACTS
-from rbfrag.solver.toppling_run import OUTCOMES, refuse_endless
+from rbfrag.solver.toppling_run import OUTCOMES, reject_endless
 
 FACTOR = "restitution_factor"
 """Name of the factor on the restitution in what is stored of a block."""
@@ -81,7 +81,7 @@ class RockingCampaign(CampaignKind):
             for case, ratios in zip(cases, strengths, strict=True)
             for kr in (ratios * excited.pga_g).tolist()
         ]
-        refuse_endless(excited, max(case.size for case in cases))
+        reject_endless(excited, max(case.size for case in cases))
         runs = simulate_free(
             excited,
             np.array([(block.toe, block.heel) for block in blocks]),

@@ -6,7 +6,7 @@ import sys
 
 from rbfrag.cli.output import print_json, print_pairs, print_table
 from rbfrag.cli.parameters import options
-from rbfrag.cli.parameters.stack import option, stacked
+from rbfrag.cli.parameters.option_groups import option, stacked
 
 EXAMPLE = "Example:  rbfrag bench"
 

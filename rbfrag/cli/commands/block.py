@@ -8,7 +8,7 @@ from typing import Annotated
 from rbfrag.cli.output import check_files, print_json, print_result, write_table
 from rbfrag.cli.parameters import options
 from rbfrag.cli.parameters.block import MeshOptions
-from rbfrag.cli.parameters.stack import ParsedInputs, fields_of, option, stacked
+from rbfrag.cli.parameters.option_groups import ParsedInputs, fields_of, option, stacked
 from rbfrag.results.diagnostic import Diagnostic
 from rbfrag.vocabulary.quantities import AT_REST, COMMON, JOINT, PLANES, SHAPE
 
@@ -61,7 +61,7 @@ def block(
     if mesh.mesh is not None:
         _mesh(mesh.mesh, mesh, inputs.get("density_kg_m3"), plot, printing)
         return
-    from rbfrag.question.blocks import on_planes
+    from rbfrag.question.classify import on_planes
     from rbfrag.solver.kinds import kind_of_mode
     from rbfrag.solver.stability.single import stability
 

@@ -9,7 +9,7 @@ from rbfrag.cli.output import check_files, print_result, say_when_compiling
 from rbfrag.cli.parameters import options
 from rbfrag.cli.parameters.block import numbers_of
 from rbfrag.cli.parameters.motion import find_shaking
-from rbfrag.cli.parameters.stack import ParsedInputs, fields_of, option, stacked
+from rbfrag.cli.parameters.option_groups import ParsedInputs, fields_of, option, stacked
 from rbfrag.errors import InputError
 from rbfrag.vocabulary.quantities import COMMON, JOINT, PLANES, SHAPE
 
@@ -81,7 +81,7 @@ def critical(
         raise InputError(f"--kind {searched.kind} has no critical value: {why}")
     block, block_kr, remarks = _searched_block(inputs, searched.kind)
     model = _chosen_kind(searched.kind, block, displacement)
-    _refuse_options_of_other_kinds(
+    _reject_options_of_other_kinds(
         model,
         {
             "--p2": "p2" in block,
@@ -134,7 +134,7 @@ SEARCH_OPTION = {
 
 
 def _chosen_kind(kind: str | None, block: dict[str, Any], displacement: str | None) -> KindSpec:
-    from rbfrag.question.shapes import SIDES_AND_PLANES, WAYS
+    from rbfrag.question.shape_validation import SIDES_AND_PLANES, WAYS
     from rbfrag.solver.critical import kind_of
     from rbfrag.solver.kinds import facts_of, kind_of_mode
 
@@ -152,7 +152,7 @@ def _chosen_kind(kind: str | None, block: dict[str, Any], displacement: str | No
     return kind_of_mode("topple" if displacement is None else "slide")
 
 
-def _refuse_options_of_other_kinds(model: KindSpec, used_options: dict[str, bool]) -> None:
+def _reject_options_of_other_kinds(model: KindSpec, used_options: dict[str, bool]) -> None:
     from rbfrag.solver.kinds import KINDS
 
     for word, is_given in used_options.items():
@@ -168,12 +168,12 @@ def _searched_block(
     inputs: ParsedInputs, kind: str | None
 ) -> tuple[dict[str, Any], float | None, tuple[str, ...]]:
     """Return the block of a search by keyword, its k_r if it topples, and warnings."""
-    from rbfrag.question.blocks import shape_of, without_kv
+    from rbfrag.question.classify import shape_of, without_kv
     from rbfrag.solver.kinds import PLANES, facts_of, kind_of_mode
     from rbfrag.solver.stability.residual_strength import (
         JOINT,
         after_first_slip,
-        refuse_before_slip,
+        reject_before_slip,
     )
     from rbfrag.solver.stability.single import stability
 
@@ -192,7 +192,7 @@ def _searched_block(
         return {"p2": numbers["p2"]}, numbers["kr"], remarks
     with inputs.named():
         planes, after = after_first_slip(shape.block, shape.require_friction().planes)
-        refuse_before_slip(shape.block, planes, kind)
+        reject_before_slip(shape.block, planes, kind)
         for name, nothing in (("cohesion_pa", 0.0), ("back_fracture", True)):
             if planes.pop(name, nothing) != nothing:
                 raise InputError(

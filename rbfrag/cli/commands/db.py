@@ -8,7 +8,7 @@ import typer
 
 from rbfrag.cli.output import print_json, print_result, say_when_compiling
 from rbfrag.cli.parameters import options
-from rbfrag.cli.parameters.stack import argument, command_group, option, stacked
+from rbfrag.cli.parameters.option_groups import argument, command_group, option, stacked
 from rbfrag.errors import InputError
 
 if TYPE_CHECKING:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import typer
 
-from rbfrag.cli.parameters.stack import option, stacked
+from rbfrag.cli.parameters.option_groups import option, stacked
 
 EXAMPLE = "Example:  rbfrag demo"
 

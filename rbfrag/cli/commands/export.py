@@ -10,7 +10,13 @@ import typer
 from rbfrag.cli.output import print_result
 from rbfrag.cli.parameters import options
 from rbfrag.cli.parameters.block import BlocksOptions
-from rbfrag.cli.parameters.stack import ParsedInputs, command_group, fields_of, option, stacked
+from rbfrag.cli.parameters.option_groups import (
+    ParsedInputs,
+    command_group,
+    fields_of,
+    option,
+    stacked,
+)
 from rbfrag.vocabulary.quantities import ANSWERING
 
 if TYPE_CHECKING:
@@ -50,7 +56,7 @@ class FunctionOptions(BlocksOptions):
         self, inputs: ParsedInputs, answering: ParsedInputs
     ) -> tuple[dict[str, Any], tuple[str, ...]]:
         """Return the keywords of `rbfrag.export`, and warnings about the blocks."""
-        several = self.given_blocks(inputs, one_kind=True)
+        several = self.collect_blocks(inputs, one_kind=True)
         of_many = several.is_class or several.rows is not None
         keywords = {
             **({"blocks": several.question} if of_many else several.numbers),

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from rbfrag.cli.output import print_result
 from rbfrag.cli.parameters import options
-from rbfrag.cli.parameters.stack import option, stacked
+from rbfrag.cli.parameters.option_groups import option, stacked
 from rbfrag.fragility.measures import TERMS, Term
 from rbfrag.vocabulary.quantities import word_of
 

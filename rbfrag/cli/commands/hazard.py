@@ -9,7 +9,7 @@ from rbfrag.cli.commands.simulate import WorkerOptions
 from rbfrag.cli.output import check_files, print_result, write_table
 from rbfrag.cli.parameters import options
 from rbfrag.cli.parameters.block import BlocksOptions
-from rbfrag.cli.parameters.stack import ParsedInputs, argument, fields_of, option, stacked
+from rbfrag.cli.parameters.option_groups import ParsedInputs, argument, fields_of, option, stacked
 from rbfrag.errors import InputError
 from rbfrag.results.diagnostic import diagnostics
 from rbfrag.vocabulary.quantities import BLOCK, COMMON
@@ -100,16 +100,16 @@ def hazard(
 
     from rbfrag.exchange.release import RELEASE, SIDES, release_columns
     from rbfrag.exchange.site_rates import blocks_at_sites, numbers_of_dry, rate_columns
-    from rbfrag.fragility.unusable import FROM_SUMS
-    from rbfrag.hazards.answer import hazard_at_sites
+    from rbfrag.fragility.invalid_rows import FROM_SUMS
     from rbfrag.hazards.branches import branch_weights
     from rbfrag.hazards.curve_file import suited_in
-    from rbfrag.hazards.kernel import rate_part
+    from rbfrag.hazards.hazard_rates import hazard_at_sites
+    from rbfrag.hazards.rate_integration import rate_part
     from rbfrag.question.question import is_wet, no_drained_bound, without_water
 
     check_files(table=out, plot=plot, excel_text=excel_text)
     check_files(table=release)
-    table, is_class, remarks, rows = blocks.given_blocks(inputs, reads=(*RELEASE, "count"))
+    table, is_class, remarks, rows = blocks.collect_blocks(inputs, reads=(*RELEASE, "count"))
     if release is not None and is_class:
         raise InputError(
             "--release requires the coordinates of blocks: use --blocks instead of --rockmass"
@@ -123,7 +123,7 @@ def hazard(
     if rows is not None:
         of_none = np.isin(np.arange(rows.blocks["row"].size), [*at.missing])
         rows = rows.without(of_none, at.missing.__getitem__)
-        remarks += rows.unusable_in_words(FROM_SUMS)
+        remarks += rows.describe_invalid(FROM_SUMS)
     if plot is not None and len(at.names) > 1 and not is_class:
         raise InputError(
             "--plot requires a single block at a single site: give --site, --p2 and --kr"
@@ -139,7 +139,7 @@ def hazard(
     )  # fmt: skip
     if is_wet(inputs) if rows is None else rows.wet is not None:
         try:
-            dry = blocks.given_blocks(
+            dry = blocks.collect_blocks(
                 ParsedInputs(without_water(inputs)), reads=(*RELEASE, "count"), dry=True
             )
             bound = hazard_at_sites(
@@ -154,7 +154,7 @@ def hazard(
         except InputError as error:
             remarks += (no_drained_bound(error),)
     answer = replace(
-        answer, names=tuple(at.names), rejected={} if rows is None else rows.refused_by_row(),
+        answer, names=tuple(at.names), rejected={} if rows is None else rows.rejected_by_row(),
         warnings=diagnostics(remarks, at.remarks, answer.warnings),
     )  # fmt: skip
     if out is not None:

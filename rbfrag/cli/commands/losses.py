@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from rbfrag.cli.commands.simulate import WorkerOptions
 from rbfrag.cli.output import ProgressBar, check_files, print_result, write_table
 from rbfrag.cli.parameters import options
-from rbfrag.cli.parameters.stack import argument, option, stacked
+from rbfrag.cli.parameters.option_groups import argument, option, stacked
 
 EXAMPLE = "Example:  rbfrag losses FOLDER --blocks blocks.csv --component rotd50 --out events.csv"
 

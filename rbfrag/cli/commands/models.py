@@ -9,7 +9,7 @@ import typer
 from rbfrag.cli.output import print_result
 from rbfrag.cli.parameters import options
 from rbfrag.cli.parameters.completion import model_names
-from rbfrag.cli.parameters.stack import argument, command_group, stacked
+from rbfrag.cli.parameters.option_groups import argument, command_group, stacked
 
 app = command_group(
     "List, show and choose fitted fragility models.", "Example:  rbfrag models show logistic-pgv"
@@ -29,8 +29,8 @@ def list_models(db: options.Db = None, json: options.Json = False) -> None:
     available, the default model is used, else the best. Models of methods for comparison are used
     by name only. Without a database the built-in models are listed.
     """
-    from rbfrag.fragility.lookup import stored_rows
     from rbfrag.fragility.model_list import ModelList
+    from rbfrag.fragility.model_selection import stored_rows
 
     print_result(ModelList(stored_rows(db)), json=json)
 
@@ -52,8 +52,8 @@ def show_model(
         list_models(db, json=printing.json)
         return
     from rbfrag.fragility.fit.report import FitReport
-    from rbfrag.fragility.lookup import stored_row
     from rbfrag.fragility.model import FragilityModel
+    from rbfrag.fragility.model_selection import stored_row
 
     row = stored_row(name, db)
     report = FitReport.from_model(FragilityModel.from_row(row))

@@ -11,7 +11,7 @@ import typer
 from rbfrag.cli.output import ProgressBar, print_json, print_result, print_table
 from rbfrag.cli.parameters import options
 from rbfrag.cli.parameters.motion import find_motion, stored_row
-from rbfrag.cli.parameters.stack import argument, command_group, option, stacked
+from rbfrag.cli.parameters.option_groups import argument, command_group, option, stacked
 from rbfrag.results.numbers import count_of
 
 if TYPE_CHECKING:

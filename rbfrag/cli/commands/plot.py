@@ -17,7 +17,13 @@ from rbfrag.cli.output import (
 from rbfrag.cli.parameters import options
 from rbfrag.cli.parameters.block import numbers_of
 from rbfrag.cli.parameters.motion import find_motion, find_shaking
-from rbfrag.cli.parameters.stack import ParsedInputs, command_group, fields_of, option, stacked
+from rbfrag.cli.parameters.option_groups import (
+    ParsedInputs,
+    command_group,
+    fields_of,
+    option,
+    stacked,
+)
 from rbfrag.errors import InputError
 from rbfrag.vocabulary.quantities import COMMON, JOINT, PLANES, SHAPE, SPACE
 
@@ -352,7 +358,7 @@ def plot_rotation(
     """
     from rbfrag.plots.rotation import plot_rotation as draw
     from rbfrag.plots.rotation import yield_lines
-    from rbfrag.question.blocks import on_planes, without_kv
+    from rbfrag.question.classify import on_planes, without_kv
 
     with inputs.named():
         block, planes, *_ = on_planes(without_kv(inputs))

@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 from rbfrag.cli.output import check_files, print_result
 from rbfrag.cli.parameters import options
-from rbfrag.cli.parameters.stack import ParsedInputs, fields_of, option, stacked
+from rbfrag.cli.parameters.option_groups import ParsedInputs, fields_of, option, stacked
 from rbfrag.vocabulary.quantities import BLOCK, COMMON, REQUEST
 
 EXAMPLE = "Example:  rbfrag predict --height 2.4 --width 0.5 --dip 3 --pgv 0.6"

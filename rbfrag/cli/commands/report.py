@@ -14,7 +14,7 @@ from rbfrag.cli.output import (
     print_warnings,
 )
 from rbfrag.cli.parameters import options
-from rbfrag.cli.parameters.stack import ParsedInputs, argument, fields_of, option, stacked
+from rbfrag.cli.parameters.option_groups import ParsedInputs, argument, fields_of, option, stacked
 from rbfrag.vocabulary.quantities import BLOCK, COMMON, REQUEST
 
 EXAMPLE = "Example:  rbfrag report --height 2.4 --width 0.5 --pgv 0.6 --out block.pdf"

@@ -10,7 +10,7 @@ from rbfrag.cli.output import print_result, say_when_compiling
 from rbfrag.cli.parameters import options
 from rbfrag.cli.parameters.block import numbers_of
 from rbfrag.cli.parameters.motion import find_shaking
-from rbfrag.cli.parameters.stack import ParsedInputs, fields_of, option, stacked
+from rbfrag.cli.parameters.option_groups import ParsedInputs, fields_of, option, stacked
 from rbfrag.errors import InputError
 from rbfrag.vocabulary.quantities import COMMON, FAILURE, JOINT, PLANES, SCATTER, SHAPE
 
@@ -248,8 +248,8 @@ def _body(
     inputs: ParsedInputs, kind: str | None
 ) -> tuple[Block | None, dict[str, Any], tuple[str, ...]]:
     """Return the block if its geometry is simulated, its keywords, and warnings."""
-    from rbfrag.question.blocks import shape_of, without_kv
-    from rbfrag.question.shapes import TAKEN_NOT_TO_SLIP
+    from rbfrag.question.classify import shape_of, without_kv
+    from rbfrag.question.shape_validation import TAKEN_NOT_TO_SLIP
     from rbfrag.solver.kinds import facts_of, kind_of_mode
 
     with inputs.named():
@@ -260,7 +260,7 @@ def _body(
         if shape is None:
             return None, {"kind": kind, **parameters}, ()
         if len(parameters.keys() - {"beta_deg"}):
-            numbers_of(inputs)  # refuses a block that is described twice
+            numbers_of(inputs)  # rejects a block that is described twice
         if "phi_deg" in shape.planes:
             return shape.block, {"kind": kind, "block": shape.block, **shape.planes}, ()
         backed = shape.planes.get("back_fracture", True)

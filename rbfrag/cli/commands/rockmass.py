@@ -14,7 +14,7 @@ from rbfrag.cli.output import (
 )
 from rbfrag.cli.parameters import options
 from rbfrag.cli.parameters.motion import find_shaking
-from rbfrag.cli.parameters.stack import argument, option, stacked
+from rbfrag.cli.parameters.option_groups import argument, option, stacked
 
 EXAMPLE = "Example:  rbfrag rockmass rockmass.toml --pgv 0.6 --out blocks.csv --plot counts.png"
 

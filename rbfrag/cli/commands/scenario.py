@@ -6,7 +6,7 @@ from typing import Annotated
 
 from rbfrag.cli.output import print_result
 from rbfrag.cli.parameters import options
-from rbfrag.cli.parameters.stack import ParsedInputs, fields_of, stacked
+from rbfrag.cli.parameters.option_groups import ParsedInputs, fields_of, stacked
 from rbfrag.vocabulary.quantities import SOURCE
 
 EXAMPLE = "Example:  rbfrag scenario --magnitude 6.8 --rjb 12 --vs30 760 --mechanism reverse"

@@ -9,7 +9,7 @@ from dataclasses import asdict, dataclass
 from runpy import run_module
 
 from rbfrag.cli.parameters import options
-from rbfrag.cli.parameters.stack import option, stacked
+from rbfrag.cli.parameters.option_groups import option, stacked
 from rbfrag.errors import MissingExtraError
 
 EXAMPLE = "Example:  rbfrag serve --db rbfrag.db --port 8000"

@@ -8,7 +8,7 @@ from typing import Any
 from rbfrag.cli.output import ProgressBar, check_files, print_result, write_table
 from rbfrag.cli.parameters import options
 from rbfrag.cli.parameters.block import BlocksOptions
-from rbfrag.cli.parameters.stack import argument, option, stacked
+from rbfrag.cli.parameters.option_groups import argument, option, stacked
 from rbfrag.errors import InputError
 from rbfrag.results.diagnostic import as_documents
 
@@ -79,7 +79,7 @@ def shakemap(
 
     target = output_path(out, SUFFIXES, "map")
     check_files(table=out if excel_text else None, plot=plot, excel_text=excel_text)
-    several = blocks.given_blocks(inputs, n=n, reads=(*PLACE, "weight", "count"), one_kind=True)
+    several = blocks.collect_blocks(inputs, n=n, reads=(*PLACE, "weight", "count"), one_kind=True)
     if target.suffix.lower() in RASTERS and "lon" in several.columns:
         raise InputError(
             f"{target}: GeoTIFF is supported for grid nodes only, not for blocks with "

@@ -14,7 +14,7 @@ from rbfrag.cli.output import (
     write_table,
 )
 from rbfrag.cli.parameters import options
-from rbfrag.cli.parameters.stack import option, stacked
+from rbfrag.cli.parameters.option_groups import option, stacked
 
 if TYPE_CHECKING:
     from rbfrag.campaign.summary import CampaignProgress
@@ -182,7 +182,7 @@ def simulate(
             rotations_deg=None if blocks.rotation is None else _rotations(blocks.rotation),
             displacements_m=_numbers(blocks.displacement, "--displacement"),
             restitution_factors=_numbers(blocks.restitution_factor, "--restitution-factor"),
-            vertical=cast("Vertical", stored.vertical),  # any other word is refused
+            vertical=cast("Vertical", stored.vertical),  # any other word is rejected
             grid=None if stored.grid is None else _grid(stored.grid),
             store_responses=None if histories is None else _blocks(histories),
             full_map=stored.full_map,

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 from rbfrag.cli.output import check_files, print_json, print_result, write_table
 from rbfrag.cli.parameters import options
 from rbfrag.cli.parameters.motion import find_motion
-from rbfrag.cli.parameters.stack import option, stacked
+from rbfrag.cli.parameters.option_groups import option, stacked
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -8,7 +8,7 @@ from typing import Annotated
 from rbfrag.cli.output import check_files, print_result
 from rbfrag.cli.parameters import options
 from rbfrag.cli.parameters.block import TableOptions
-from rbfrag.cli.parameters.stack import ParsedInputs, argument, fields_of, option, stacked
+from rbfrag.cli.parameters.option_groups import ParsedInputs, argument, fields_of, option, stacked
 from rbfrag.vocabulary.quantities import BLOCK, COMMON
 
 EXAMPLE = (
@@ -74,7 +74,7 @@ def survival(
         inputs["kind"] = kind
     if blocks.blocks is None:
         require_kind(inputs)
-    several = blocks.given_blocks(inputs, reads=("count",), need_kind=KIND_MISSING)
+    several = blocks.collect_blocks(inputs, reads=("count",), need_kind=KIND_MISSING)
     remarks, rows, numbers = several.remarks, several.rows, several.numbers
     if rows is not None:
         rows.require_all(ALL_STAND)

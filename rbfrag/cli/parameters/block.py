@@ -6,8 +6,8 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from rbfrag.cli.parameters.option_groups import ParsedInputs, option
 from rbfrag.cli.parameters.options import CRS, EXCEL_TEXT, IGNORE_COLUMNS, SHEET, column_names
-from rbfrag.cli.parameters.stack import ParsedInputs, option
 from rbfrag.errors import InputError
 from rbfrag.results.numbers import percent
 from rbfrag.vocabulary.quantities import column_of
@@ -54,7 +54,7 @@ class TableOptions:
     ignore_columns: str | None = option(IGNORE_COLUMNS, metavar="NAME,NAME")
     crs: str | None = option(CRS)
 
-    def given_blocks(
+    def collect_blocks(
         self,
         inputs: ParsedInputs,
         *,
@@ -104,7 +104,7 @@ class BlocksOptions(TableOptions):
         "Rock mass file (.toml, .csv), for the mean over its stable toppling blocks", metavar="FILE"
     )
 
-    def given_blocks(
+    def collect_blocks(
         self,
         inputs: ParsedInputs,
         *,
@@ -127,7 +127,7 @@ class BlocksOptions(TableOptions):
             dry: without the water that a table has behind blocks.
         """
         if self.rockmass is None:
-            return super().given_blocks(
+            return super().collect_blocks(
                 inputs, name=name, reads=reads, one_kind=one_kind, need_kind=need_kind, dry=dry
             )
         from rbfrag.fragility.method import TOPPLING_BLOCK
@@ -153,11 +153,11 @@ def numbers_of(
     Raises:
         InputError: it is described twice or in part, or is of another kind.
     """
-    from rbfrag.question.blocks import one_block
+    from rbfrag.question.classify import classify_block
 
     block_inputs = {field: value for field, value in inputs.items() if field != "kind"}
     with inputs.named():
-        blocks = one_block(block_inputs, inputs.get("kind", kind), pga_g)
+        blocks = classify_block(block_inputs, inputs.get("kind", kind), pga_g)
     (group,) = blocks.groups
     return group.kind, {**group.numbers}, (*inputs.notes, *blocks.remarks)
 
@@ -181,7 +181,7 @@ class GivenBlocks(NamedTuple):
     @property
     def numbers(self) -> dict[str, Any]:
         """Model inputs of the blocks, by field, and their kinds."""
-        from rbfrag.question.blocks import numbers_in
+        from rbfrag.question.classify import numbers_in
 
         kinds = [str(kind) for kind in self.columns["kind"]]
         return {**numbers_in(self.columns), "kind": kinds}

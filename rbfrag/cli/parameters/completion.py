@@ -17,7 +17,7 @@ def model_names(ctx: typer.Context, incomplete: str) -> list[tuple[str, str]]:
         ctx: of typer, with the options that are typed already.
         incomplete: what is typed of the name.
     """
-    from rbfrag.fragility.lookup import stored_rows
+    from rbfrag.fragility.model_selection import stored_rows
 
     try:
         rows = stored_rows(ctx.params.get("db"))

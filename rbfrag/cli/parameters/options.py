@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 from rbfrag.cli.parameters.completion import motion_ids
-from rbfrag.cli.parameters.stack import ParsedInputs, fields_of, option
+from rbfrag.cli.parameters.option_groups import ParsedInputs, fields_of, option
 from rbfrag.errors import InputError
 from rbfrag.vocabulary.quantities import (
     ANSWERING,
@@ -168,7 +168,7 @@ class Direction:
 
 
 WITHIN_KM = 5.0
-"""Default of the distance of blocks to sites [km], as `rbfrag.exchange.site_join` has it."""
+"""Default of the distance of blocks to sites [km], as `rbfrag.exchange.nearest_site` has it."""
 
 WITHIN_HELP = (
     "Maximum distance from a block to the nearest site, for sites joined by lon and lat [km]"

@@ -51,7 +51,7 @@ _LEAST_S, _BYTES_A_SECOND = 20.0, 1e7
 
 
 @lru_cache
-def _refuse_endless(path: Path, size: int, _changed_ns: int) -> None:
+def _reject_endless(path: Path, size: int, _changed_ns: int) -> None:
     """Reject a damaged file that makes the HDF5 library hang or crash.
 
     Only another process can be stopped in the library; an exception there comes here again.
@@ -229,7 +229,7 @@ def _opened(path: Path) -> Iterator[Any]:
         if not h5py.is_hdf5(path):
             raise InputError(f"{path}: not an HDF5 file: name {_DATASTORE}, calc_N.hdf5")
         about = path.stat()
-        _refuse_endless(path, about.st_size, about.st_mtime_ns)
+        _reject_endless(path, about.st_size, about.st_mtime_ns)
         try:
             with h5py.File(path, "r") as file:
                 yield file

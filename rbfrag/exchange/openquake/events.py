@@ -137,7 +137,7 @@ def read_events(
         for name, path in files.paths().items()
         if (table := _table(path, name)) is not None
     }
-    _refuse_other_jobs(heads)
+    _reject_other_jobs(heads)
     sites = _sites(heads["sitemesh"])
     weights, remarks = _weights(heads["realizations"])
     event_id, realization, year = _events(heads["events"], weights)
@@ -202,7 +202,7 @@ def _table(path: Path, content: str) -> Table | None:
     return stored_table(path, content) if path.suffix.lower() in SUFFIXES else Table.of(path)
 
 
-def _refuse_other_jobs(heads: Mapping[str, Table]) -> None:
+def _reject_other_jobs(heads: Mapping[str, Table]) -> None:
     first = heads["gmf_data"]
     for head in heads.values():
         for name in ("checksum", "start_date"):

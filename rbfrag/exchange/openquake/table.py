@@ -50,7 +50,7 @@ def _next(parts: Any, too_many_cells: type[Warning]) -> Any:
 
     pandas cuts such a line with a warning where it is the first of a part.
     """
-    # numpy warns of a number beyond all integers, which pandas then refuses
+    # numpy warns of a number beyond all integers, which pandas then rejects
     with warnings.catch_warnings(), np.errstate(invalid="ignore"):
         warnings.simplefilter("error", too_many_cells)
         return next(parts, None)

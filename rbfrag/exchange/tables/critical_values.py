@@ -122,7 +122,7 @@ def _read_rows(source: Path, columns: Mapping[str, Mapping[str, str]]) -> pd.Dat
     raw = raw.set_axis(raw.index + 2).dropna(how="all")
     rows = pd.DataFrame(index=raw.index)
 
-    def refuse(bad: pd.Series[bool], field: str, why: str) -> None:
+    def reject(bad: pd.Series[bool], field: str, why: str) -> None:
         if bad.any():
             line = bad.idxmax()
             cell = raw[columns[field]["column"]][line]
@@ -135,30 +135,30 @@ def _read_rows(source: Path, columns: Mapping[str, Mapping[str, str]]) -> pd.Dat
         cells = raw[about["column"]]
         if field in KEY[:2]:
             rows[field] = cells
-            refuse(cells.isna() | (cells.str.len() > LONGEST_NAME), field, "give it a name")
+            reject(cells.isna() | (cells.str.len() > LONGEST_NAME), field, "give it a name")
         elif field in WORDS:
             meant = {about.get(word, word): word for word in WORDS[field]}
             rows[field] = cells.map(meant)
-            refuse(rows[field].isna(), field, f"the map knows {', '.join(map(repr, meant))}")
+            reject(rows[field].isna(), field, f"the map knows {', '.join(map(repr, meant))}")
         else:
             unit = UNITS.get(field, "")
             factor = unit_factor(unit, about.get("unit", unit))
             rows[field] = numbers = pd.to_numeric(cells, errors="coerce") * factor
             bad = ~np.isfinite(numbers) | (numbers < 0.0) & (field != "magnitude")
             bad |= (numbers == 0.0) & (field in ABOVE_ZERO)
-            refuse(bad & (cells.notna() | (field in NEEDED)), field, "it must be a number above 0")
-    refuse(rows["pga_g"] > 4.0 * LARGEST_PGA_G, "pga_g", "no ground shakes so: check its unit")
+            reject(bad & (cells.notna() | (field in NEEDED)), field, "it must be a number above 0")
+    reject(rows["pga_g"] > 4.0 * LARGEST_PGA_G, "pga_g", "no ground shakes so: check its unit")
     for field, words in WORDS.items():
         rows[field] = rows.get(field, words[0])
     observed, field = rows["status"] == "found", "kr" if "kr" in columns else "kr_over_pga"
     ratio = (rows[field] / (rows["pga_g"] if field == "kr" else 1.0)).where(observed)
-    refuse(observed & ~(ratio > 0.0), field, "where no block topples, say so by the status")
-    refuse(ratio > 1.01, field, "it is above PGA, where no block moves: check both units")
+    reject(observed & ~(ratio > 0.0), field, "where no block topples, say so by the status")
+    reject(ratio > 1.01, field, "it is above PGA, where no block moves: check both units")
     rows["kr_over_pga"] = ratio
-    refuse(rows.duplicated([*KEY]), "motion", "its p² and polarity stand above: keep one")
+    reject(rows.duplicated([*KEY]), "motion", "its p² and polarity stand above: keep one")
     for field in columns.keys() & {*MEASURES, "magnitude"}:
         first = rows.groupby([*KEY[:2]])[field].transform("first")
-        refuse(first.notna() & (rows[field] != first), field, "its motion has another above")
+        reject(first.notna() & (rows[field] != first), field, "its motion has another above")
     return rows
 
 

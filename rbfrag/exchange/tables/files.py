@@ -28,7 +28,7 @@ SUFFIXES = (".csv", ".xlsx", ".parquet")
 """File types of a table of blocks, of which .ods is read too."""
 
 MOST_BYTES = 1 << 36
-"""Larger tables are refused: a thousand million blocks need no more."""
+"""Larger tables are rejected: a thousand million blocks need no more."""
 
 _LARGE = 1 << 20
 """Bytes of CSV that are worth loading pyarrow for, which takes a third of a second."""

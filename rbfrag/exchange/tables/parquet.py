@@ -41,7 +41,7 @@ def open_parquet(origin: Path, stack: ExitStack) -> TableFile:
             first += group.num_rows
             for name, column in zip(names, group.columns, strict=True):
                 if _is_text(arrow, column):
-                    _refuse_other_text(arrow, column, f"{origin}: column {name}", lines[0])
+                    _reject_other_text(arrow, column, f"{origin}: column {name}", lines[0])
             blank = blank_rows(arrow, group)
             if blank.any():
                 lines = [line for line, nothing in zip(lines, blank, strict=True) if not nothing]
@@ -67,7 +67,7 @@ def _is_text(arrow: Any, column: Any) -> bool:
     return bool(arrow.types.is_string(column.type) or arrow.types.is_large_string(column.type))
 
 
-def _refuse_other_text(arrow: Any, column: Any, where: str, first: int) -> None:
+def _reject_other_text(arrow: Any, column: Any, where: str, first: int) -> None:
     """Reject text that is not UTF-8, which Parquet does not check."""
     try:
         column.validate(full=True)

@@ -34,7 +34,7 @@ MOST_ROWS = 1 << 20
 """Rows of a sheet, its first with the names."""
 
 MOST_BYTES = 1 << 30
-"""Workbooks that unpack to more are refused: a sheet of a million rows is smaller."""
+"""Workbooks that unpack to more are rejected: a sheet of a million rows is smaller."""
 
 DAMAGED = (
     zipfile.BadZipFile, zlib.error, struct.error, ParseError, EOFError, LookupError, ValueError,

@@ -388,7 +388,7 @@ def fit_data(source: FitSource, method: Method, term: Term, *, kind: str | None 
         sensitive=None if points.sensitive is None else points.sensitive[chosen],
         least_y_m_s=least,
     )
-    _refuse_thin(data, method, term)
+    _reject_thin(data, method, term)
     return data
 
 
@@ -411,7 +411,7 @@ def _fingerprint(
     return hashlib.sha256(b"\n".join(sorted(lines))).hexdigest()
 
 
-def _refuse_thin(data: FitData, method: Method, term: Term) -> None:
+def _reject_thin(data: FitData, method: Method, term: Term) -> None:
     of_outcomes = method.reads == "outcomes"
     tells = (np.isfinite(data.failed) & data.read).any(axis=1) if of_outcomes else data.observed
     n = int(tells.sum())

@@ -203,10 +203,10 @@ class PairTables:
         generator = np.random.default_rng(seed)
         pair_tables = (pair_table(rows, kind, generator) for kind in KINDS)
         tables = cls(names, *pair_tables)
-        tables._refuse_few()
+        tables._reject_few()
         return tables
 
-    def _refuse_few(self) -> None:
+    def _reject_few(self) -> None:
         for name, table, fewest in (
             ("other sites", self.far, FEWEST_EVENTS),
             ("the two components of a site", self.near, FEWEST_EVENTS),

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Required, Unpack
 
 import numpy as np
 
-from rbfrag.db.model_file import ModelRow, refuse_taken
+from rbfrag.db.model_file import ModelRow, reject_taken
 from rbfrag.db.rows import IMPORTED, CombinationTable, Selection
 from rbfrag.errors import FitError, InputError
 from rbfrag.fragility.fit.clusters import cr3
@@ -83,12 +83,12 @@ def fit(
     """
     of_term = intensity_term(term)
     chosen = method_of_kind(kind, method, term, estimate_m=estimate_m)
-    _refuse_unfit(chosen, of_term, kind, estimate_m, selection.get("rotation_deg"))
+    _reject_unfit(chosen, of_term, kind, estimate_m, selection.get("rotation_deg"))
     if seed < 0:
         raise InputError(f"seed = {seed}: give a whole number, 0 or more")
     if name is not None and not name.strip():
         raise InputError("the name of the model is empty: give a name or omit it")
-    refuse_taken(name or _name(chosen, of_term, kind, selection), taken)
+    reject_taken(name or _name(chosen, of_term, kind, selection), taken)
     if isinstance(source, CombinationTable):
         source = FitSource.of_table(source)
     elif source is None or isinstance(source, str | PathLike):
@@ -246,7 +246,7 @@ def _scatter(data: FitData, method: Method, term: Term) -> dict[str, object] | N
     return joint_scatter((*method.block.names, *term.inputs), data.blocks, fitted)
 
 
-def _refuse_unfit(
+def _reject_unfit(
     method: Method, term: Term, kind: str, estimate_m: bool, rotation_deg: float | None
 ) -> None:
     if term.name not in method.forms:

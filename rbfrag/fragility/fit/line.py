@@ -266,7 +266,7 @@ def fit_wls(data: FitData, method: Method, term: Term, *, seed: int) -> MethodRe
     form, degree = method.forms[term.name], term.variance_degree
     x, y, events = data.x[data.observed], data.y[data.observed], data.event[data.observed]
     bins = Bins.equal_count(x)
-    _refuse_without_scatter(x, y)
+    _reject_without_scatter(x, y)
     fit = iterate(bins, y, np.ones(x.size), degree)
     if fit.parameters[1] <= 0.0:
         raise FitError(
@@ -372,7 +372,7 @@ def event_bootstrap(
     return samples, stable.count(False)
 
 
-def _refuse_without_scatter(x: FloatArray, y: FloatArray) -> None:
+def _reject_without_scatter(x: FloatArray, y: FloatArray) -> None:
     residuals = y - np.polynomial.Polynomial.fit(x, y, 1)(x)
     if residuals.std() <= 1e-9 * np.abs(y).max():
         raise FitError(

@@ -66,7 +66,7 @@ def fit(
             f"db = {type(db).__name__}: give a path or URL; what stores nothing and takes a "
             "connection or a table is rbfrag.fragility.fit.fitting.fit"
         )
-    UnknownFieldError.refuse(question, FitOptions, "a fit")
+    UnknownFieldError.reject(question, FitOptions, "a fit")
     if question.get("term") is None:
         raise InputError(
             "term is missing: give the intensity measure, such as fit(db, term='pgv'), one of "

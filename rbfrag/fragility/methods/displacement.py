@@ -59,7 +59,7 @@ BLOCK = BlockParameters(
     options=("beta_deg",),
     points="displacements",
     adjust=_level,
-    refuses=(
+    rejects=(
         MechanicalBound(
             lambda v: (
                 "beta_deg" in v

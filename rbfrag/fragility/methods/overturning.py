@@ -40,7 +40,7 @@ def _restitution(values: dict[str, Any], ns: ArrayNamespace) -> None:
         formula = 1.0 - 1.5 * square / (1.0 + square)
         factor = values.get("restitution_factor", 1.0)
         values["restitution"] = ns.maximum(factor * formula, LEAST_RESTITUTION)
-    # also of a value that is refused afterwards
+    # also of a value that is rejected afterwards
     values["speed_loss"] = ns.sqrt(ns.maximum(1.0 - values["restitution"], 0.0))
 
 
@@ -55,7 +55,7 @@ BLOCK = BlockParameters(
     judged_kr=1.0,
     fractions=("restitution",),
     adjust=_restitution,
-    refuses=(
+    rejects=(
         MechanicalBound(
             lambda v: (v["restitution"] <= 0.0) | (v["restitution"] > 1.0),
             "restitution",

@@ -9,7 +9,7 @@ from typing import Unpack
 import numpy as np
 from numpy.typing import NDArray
 
-from rbfrag.fragility.intervals import quantiles_of
+from rbfrag.fragility.confidence import quantiles_of
 from rbfrag.fragility.prediction import array_answer
 from rbfrag.fragility.prediction_array import predict_many
 from rbfrag.fragility.shaking import Scatter
@@ -150,7 +150,7 @@ def site_probability(
         for part in _chunks(np.arange(site.size), _CHUNK):
             answer = predict_many(
                 model, pairs_of(site[part], block[part]), quantiles_of(level),
-                interval=True, refuse_nan=False,
+                interval=True, reject_nan=False,
             )  # fmt: skip
             answers.append(
                 (site[part], block[part], answer.probability, answer.ci_low, answer.ci_high)

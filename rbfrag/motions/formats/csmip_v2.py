@@ -9,7 +9,7 @@ and the accelerations, 8 of width 10 a line, which may touch; then velocity and 
 same way. Older files are upper case and may wrap a header line, so that lines are found by what
 they say. Channels of one file may differ in length. A block ends with ``/&``.
 
-V3 files hold spectra of such a record, which are refused in words of their own.
+V3 files hold spectra of such a record, which are rejected in words of their own.
 """
 
 from __future__ import annotations

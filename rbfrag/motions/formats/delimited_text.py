@@ -101,7 +101,7 @@ def parse(file: RecordFile) -> Iterator[ParsedTrace]:
     columns = [[fields[place] for _, fields in rows] for place in range(len(rows[0][1]))]
     if len(columns) == 1:
         samples = file.numbers(columns[0], lambda: numbers, "acceleration")
-        _refuse_gaps(file, rows)
+        _reject_gaps(file, rows)
         dt, remark = _interval_of_list(file)
     else:
         times = file.numbers(columns[0], lambda: numbers, "time")
@@ -138,7 +138,7 @@ def _fields(row: str) -> list[str]:
 
 
 def _numeric(row: str) -> list[bool]:
-    # decimal commas are refused in words of their own, once it is clear that these are numbers
+    # decimal commas are rejected in words of their own, once it is clear that these are numbers
     decimal = "," if _mark(row) == ";" else "."
     return [
         bool(_NUMBER_LIKE.fullmatch(field.strip().replace(decimal, "."))) for field in _fields(row)
@@ -218,7 +218,7 @@ def _interval_of_list(file: RecordFile) -> tuple[float, str]:
     return indexed[0], f"the file has no dt; {indexed[0]:g} s is from {indexed[1]}"
 
 
-def _refuse_gaps(file: RecordFile, rows: list[tuple[int, list[str]]]) -> None:
+def _reject_gaps(file: RecordFile, rows: list[tuple[int, list[str]]]) -> None:
     # without times an empty line may be a missing sample
     for (above, _), (number, _) in pairwise(rows):
         if number != above + 1:

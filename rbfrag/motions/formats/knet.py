@@ -55,8 +55,8 @@ def parse(file: RecordFile) -> Iterator[ParsedTrace]:
     counts = file.free_numbers(file.lines[first:], first + 1, "count")
     duration = field("Duration Time(s)")
     seconds = file.positive(duration, "duration")
-    _refuse_large(file, counts, first)
-    # a file without any is refused by its number of samples
+    _reject_large(file, counts, first)
+    # a file without any is rejected by its number of samples
     offset = float(counts.mean()) if counts.size else 0.0
 
     direction = field("Dir.").text
@@ -86,7 +86,7 @@ def parse(file: RecordFile) -> Iterator[ParsedTrace]:
     )
 
 
-def _refuse_large(file: RecordFile, counts: FloatArray, first: int) -> None:
+def _reject_large(file: RecordFile, counts: FloatArray, first: int) -> None:
     if np.abs(counts).max(initial=0.0) <= LARGEST_COUNT:
         return
     for at in range(first, len(file.lines)):

@@ -25,10 +25,10 @@ from rbfrag.motions.text.record_file import (
 from rbfrag.motions.text.times import last_digit
 from rbfrag.motions.units import stated_in_g, unit_in_g
 
-DURATION_REFUSED, DURATION_NOTED = 0.05, 0.01
+DURATION_REJECTED, DURATION_NOTED = 0.05, 0.01
 """How far durations may differ, as part of the longer one, beyond their last printed digit."""
 
-PEAK_REFUSED, PEAK_NOTED = 1.8, 1.05
+PEAK_REJECTED, PEAK_NOTED = 1.8, 1.05
 """Factor between peaks."""
 
 FEWEST_COMPARED = 100
@@ -71,7 +71,7 @@ def _agreed(file: RecordFile, trace: ParsedTrace, traces: Traces, doubt: str) ->
     dt, on_dt = _interval(file, trace, traces)
     missing = file.missing_samples(trace.count.at(dt), trace.values.size) if trace.count else ""
     if trace.times:
-        file.refuse_other_times(trace.times, dt, trace.values.size)
+        file.reject_other_times(trace.times, dt, trace.values.size)
     is_partial = trace.is_partial or bool(missing)
     # where samples are missing, the largest may be among them
     in_g, unit, on_unit = _unit(file, replace(trace, peak=None) if is_partial else trace)
@@ -106,7 +106,7 @@ def _interval(
         )
     statements = _statements(trace, traces, dt)
     for off, text, line in statements:
-        if off > DURATION_REFUSED and requested is None:
+        if off > DURATION_REJECTED and requested is None:
             advice = "give the correct interval with dt_s, or correct the header"
             raise file.error(f"{text}: {advice}", line, fields=("dt_s",))
     return dt, tuple(f"{DOUBT}{text}" for off, text, _ in statements if off > DURATION_NOTED)
@@ -114,7 +114,7 @@ def _interval(
 
 def _agreeing(file: RecordFile, trace: ParsedTrace, traces: Traces, dt: float) -> list[bool]:
     """Return whether each entry on time agrees with an interval [s], printed times included."""
-    agreeing = [off <= DURATION_REFUSED for off, *_ in _statements(trace, traces, dt)]
+    agreeing = [off <= DURATION_REJECTED for off, *_ in _statements(trace, traces, dt)]
     seconds = trace.count.seconds if trace.count else None
     if trace.times is None and seconds is None:
         return agreeing
@@ -123,7 +123,7 @@ def _agreeing(file: RecordFile, trace: ParsedTrace, traces: Traces, dt: float) -
             complete = replace(file, allow_partial=False)
             complete.missing_samples(trace.count.at(dt), trace.values.size)
         if trace.times:
-            file.refuse_other_times(trace.times, dt, trace.values.size)
+            file.reject_other_times(trace.times, dt, trace.values.size)
     except MotionFileError:
         return [*agreeing, False]
     return [*agreeing, True]
@@ -139,7 +139,7 @@ def _statements(trace: ParsedTrace, traces: Traces, dt: float) -> list[Statement
         seconds = number_or_none(field.text) if field else None
         if field and field.text and seconds is None:
             text = f"the header's duration {shown(field.text)} is not a number"
-            statements.append((DURATION_REFUSED, text, field.line))
+            statements.append((DURATION_REJECTED, text, field.line))
         if field is None or seconds is None:
             continue
         apart = min(abs(lasting - seconds) for lasting in possible) - last_digit(field.text)
@@ -171,12 +171,12 @@ def _unit(
     off, text = _peak(trace, in_g, field.text)
     if file.units is not None and unit_in_g(file.units) != in_g:
         other = unit_in_g(file.units)
-        if off < PEAK_REFUSED or _peak(trace, other, file.units)[0] >= PEAK_REFUSED:
+        if off < PEAK_REJECTED or _peak(trace, other, file.units)[0] >= PEAK_REJECTED:
             trouble = f"the header says {field.text}, not {file.units}: omit units"
             raise file.error(trouble, field.line, fields=("units",))
         remark = f"{DOUBT}the header says {field.text}; {file.units} is what was stated"
         return other, field._replace(text=file.units), (remark,)
-    if off >= PEAK_REFUSED and file.units is None and trace.peak:
+    if off >= PEAK_REJECTED and file.units is None and trace.peak:
         advice = "state the right unit of the samples with units, or correct the header"
         raise file.error(f"{text}: {advice}", trace.peak.line, fields=("units",))
     return in_g, trace.unit, (DOUBT + text,) if off > PEAK_NOTED else ()

@@ -1,6 +1,6 @@
 """Record file as a format's parser uses it, and the traces that the parser returns.
 
-Fields are found by what they say; counts, intervals and numbers are read or refused with their
+Fields are found by what they say; counts, intervals and numbers are read or rejected with their
 line. What all traces go through (unit, missing samples, labels) is done once, in
 :mod:`rbfrag.motions.readers`.
 """
@@ -221,7 +221,7 @@ class RecordFile:
     def count(self, field: HeaderField, description: str, of: str = "") -> Count:
         """Return the number of samples in a field, an integer of at least 1."""
         digits = field.text.removesuffix(".")
-        # int() refuses thousands of digits in words of its own
+        # int() rejects thousands of digits in words of its own
         if digits.isascii() and digits.isdigit() and len(digits) < MOST_DIGITS and int(digits) > 0:
             return Count(int(digits), field.line, of)
         raise self.error(f"{description} {shown(field.text)} is not a count of samples", field.line)
@@ -261,7 +261,7 @@ class RecordFile:
     def missing_samples(self, count: Count, npts: int) -> str:
         """Return a remark if the number of samples differs from the header's, or reject the file.
 
-        A file without any is refused in any case.
+        A file without any is rejected in any case.
         """
         if npts and abs(count.number - npts) <= ROUNDING * npts:
             return ""
@@ -401,7 +401,7 @@ class RecordFile:
             )
         return numbers.reshape(-1, layout[0])
 
-    def refuse_other_times(self, times: PrintedTimes, dt: float, samples: int) -> None:
+    def reject_other_times(self, times: PrintedTimes, dt: float, samples: int) -> None:
         """Reject printed times that the sampling interval [s] does not reproduce.
 
         A missing or doubled row shows so.

@@ -105,7 +105,7 @@ def sampling_interval(
         times_s: the same as numbers [s].
         line_numbers: their 1-based lines.
         stated_dt_s: interval that the caller states [s]: used if it reproduces the times, and
-            refused otherwise.
+            rejected otherwise.
     """
     count = len(tokens)
     if count == 1:
@@ -211,7 +211,7 @@ def last_digit(token: str) -> float:
     """Return the unit of the last digit of a printed number."""
     mantissa, *exponent = _EXPONENT.split(token)
     _, _, decimals = mantissa.partition(".")
-    # float, as int() refuses exponents of thousands of digits
+    # float, as int() rejects exponents of thousands of digits
     power = (float(exponent[0]) if exponent else 0.0) - len(decimals)
     return float(f"1e{max(min(power, 300.0), -300.0):.0f}")
 

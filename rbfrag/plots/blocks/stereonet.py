@@ -70,7 +70,7 @@ def plot_planes(planes: Mapping[str, Plane], path: canvas.Out) -> canvas.Picture
     try:
         section = section_of(planes["face"], base, back)
     except InputError as error:
-        title = "No section: refused"
+        title = "No section: rejected"
         notes: tuple[str, ...] = (str(error),)
     else:
         gamma = "" if section.gamma_deg is None else f", gamma = {section.gamma_deg:.1f}°"
@@ -86,11 +86,11 @@ def _draw_net(axes: Axes, face: Plane) -> None:
 
     east = 90.0 - face.direction_deg
     shaded: dict[str, Any] = {"color": _SHADE, "alpha": 0.2, "lw": 0.0, "zorder": 0.5}
-    label = f"poles refused: strike over {STRIKE_DEG:g}° off"
+    label = f"poles rejected: strike over {STRIKE_DEG:g}° off"
     half = 90.0 - STRIKE_DEG
     for middle in (east + 90.0, east - 90.0):
         axes.add_patch(Wedge((0.0, 0.0), 1.0, middle - half, middle + half, label=label, **shaded))
-        label = "_refused"
+        label = "_rejected"
     # poles of planes flat enough for any strike are exempt
     off = np.arange(0.5, 360.0)
     sine = np.abs(np.sin(np.radians(off)))

@@ -13,20 +13,20 @@ import numpy as np
 
 from rbfrag.errors import InputError
 from rbfrag.fragility import describe
-from rbfrag.fragility.lookup import find_model
 from rbfrag.fragility.measures import TERMS
 from rbfrag.fragility.method import TOPPLING_BLOCK
 from rbfrag.fragility.model import FragilityModel
+from rbfrag.fragility.model_selection import find_model
 from rbfrag.fragility.prediction import Prediction
 from rbfrag.hazards.annual_rate import probability_in
-from rbfrag.hazards.answer import hazard
 from rbfrag.hazards.branches import Weights
 from rbfrag.hazards.curve_file import CurveLike, as_curves
 from rbfrag.hazards.hazard_answer import HazardAnswer
+from rbfrag.hazards.hazard_rates import hazard
 from rbfrag.plots.canvas import mode_title
 from rbfrag.plots.model_lines import MORE_TERMS, ONE_NUMBER_TERMS, HeldMeasures, held_measures
 from rbfrag.plots.spectrum import block_size_m
-from rbfrag.question.blocks import Shape, shape_of
+from rbfrag.question.classify import Shape, shape_of
 from rbfrag.question.document import answer_block
 from rbfrag.question.fields import RangeFields
 from rbfrag.question.question import OF_SHAKING, described, without_water

@@ -44,7 +44,7 @@ class Block:
     """A two-dimensional block of unit thickness that rests on a base and against a back plane.
 
     Make one with :meth:`rectangle`, :meth:`from_angles`, :meth:`from_fractures` or
-    :meth:`from_polygon`, which refuse what is no block. The base frame has x down the base and y
+    :meth:`from_polygon`, which reject what is no block. The base frame has x down the base and y
     out of it. Contact 1 is the heel, 2 the upper end of the back edge, 3 the toe.
 
     Args:

@@ -53,7 +53,7 @@ def inner_kernel(function: Callable[P, R]) -> Callable[P, R]:
     """Compile a function that only other kernels call, otherwise like :func:`bare_kernel`.
 
     The conversion of arguments from Python is left out, which takes a quarter of the time of
-    compilation where they hold the tables of a record. A call from Python is refused; tests take
+    compilation where they hold the tables of a record. A call from Python is rejected; tests take
     `py_func`.
     """
     compiled = _compile(function, {**_BARE, "no_cpython_wrapper": True})

@@ -47,7 +47,7 @@ from rbfrag.solver.rocking_run import (
     simulate,
 )
 from rbfrag.solver.stability.single import rectangle_r3_m
-from rbfrag.solver.toppling_run import OUTCOMES, refuse_endless
+from rbfrag.solver.toppling_run import OUTCOMES, reject_endless
 
 SENSITIVITY = 1e-6
 """Change of the motion whose effect on the outcome makes it a sensitive one."""
@@ -159,7 +159,7 @@ class Rocking(Kind):
         """
         block = self._block(supported_block)
         excited = shaking.excitation
-        refuse_endless(excited, max(block.toe.p, block.heel.p) ** 2)
+        reject_endless(excited, max(block.toe.p, block.heel.p) ** 2)
         run = simulate(excited, block)
         outcome = OUTCOMES[run.outcome]
         if math.isnan(error_of(run, outcome)):  # beyond any number: nothing is known of the end
@@ -200,7 +200,7 @@ class Rocking(Kind):
         block = self._block(supported_block)
 
         def run(excited: Excitation) -> RunEnd:
-            refuse_endless(excited, max(block.toe.p, block.heel.p) ** 2)
+            reject_endless(excited, max(block.toe.p, block.heel.p) ** 2)
             end = simulate(excited, block)
             outcome = OUTCOMES[end.outcome]
             has_peak = outcome is Outcome.STABLE

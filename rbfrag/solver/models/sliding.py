@@ -271,7 +271,7 @@ class Sliding(MechanismKind):
         It is that of any shape and any dip: on a base that dips, divide a displacement by
         cos(phi - beta)/cos(phi).
         """
-        self.refuse_foreign(options, self.search_options)
+        self.reject_foreign(options, self.search_options)
         if "displacement_m" not in options:
             raise InputError("displacement_m is missing: give the distance on a level plane [m]")
         excited = excitation(motion, vertical, polarity)

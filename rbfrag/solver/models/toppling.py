@@ -31,7 +31,7 @@ from rbfrag.solver.stability.toe_stability import (
     toe_needs_in_time,
     toe_slips_g,
 )
-from rbfrag.solver.toppling_run import history_of, outcome_of, refuse_endless, respond, simulate
+from rbfrag.solver.toppling_run import history_of, outcome_of, reject_endless, respond, simulate
 
 
 class Toppling(Kind):
@@ -74,7 +74,7 @@ class Toppling(Kind):
         p2, kr = _size(supported_block), _strength(supported_block)
 
         def run(excited: Excitation) -> RunEnd:
-            refuse_endless(excited, p2)
+            reject_endless(excited, p2)
             end = simulate(excited, p2=p2, kr=kr)
             moved = math.isfinite(end.started_s)
             if moved and supported_block.block is not None:
@@ -96,7 +96,7 @@ class Toppling(Kind):
         """Return the maximum k_r/PGA that topples, for a p² [1/s²] or that of a block."""
         from rbfrag.solver.search.critical import critical
 
-        self.refuse_foreign(options, (*self.search_options, *SHAKING))
+        self.reject_foreign(options, (*self.search_options, *SHAKING))
         block = options.pop("block", None)
         for name in PLANES:
             options.pop(name, None)

@@ -44,7 +44,7 @@ from rbfrag.solver.search.islands import (
 )
 from rbfrag.solver.search.march import TOPPLES
 from rbfrag.solver.search.scan import strongest_seen
-from rbfrag.solver.toppling_run import OUTCOMES, refuse_endless, runner
+from rbfrag.solver.toppling_run import OUTCOMES, reject_endless, runner
 
 SLIVERS = 1e-9
 """Undecided length of k_r/PGA up to which an answer still counts as certified."""
@@ -89,7 +89,7 @@ def critical(
     search_limit = positive(search_limit, "search_limit", "k_r/PGA")
     map_depth = positive(map_depth, "map_depth", "k_r/PGA")
     excitation = kept_excitation(motion, vertical, polarity)
-    refuse_endless(excitation, p2)
+    reject_endless(excitation, p2)
     blocks = SingleBlocks(excitation, p2=p2)
     pga = excitation.pga_g
     answer = CriticalResult(

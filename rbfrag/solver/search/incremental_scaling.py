@@ -187,7 +187,7 @@ class ScaledKind(MechanismKind):
         """
         # k_s and p_s² do not fix the motion of these blocks, as k_r and p² do for toppling: the
         # search is over the factor on the record for one block, not over the strength
-        self.refuse_foreign(options, self.search_options)
+        self.reject_foreign(options, self.search_options)
         for name in ("block", "beta_deg", "phi_deg"):
             if options.get(name) is None:
                 raise InputError(

@@ -31,7 +31,7 @@ from rbfrag.solver.stability.joint import (
     ROCK_KG_M3,
     OnJoint,
     is_drained,
-    refuse_half,
+    reject_half,
     roughened,
     roughness_at,
     water_at,
@@ -159,11 +159,11 @@ def stability_arrays(
         density_kg_m3: densities of the rock [kg/m³]; None for 2,650 where cohesion, water or
             roughness need it.
         nan: ``propagate`` answers NaN with its reason where the input cannot be used,
-            ``raise`` refuses it.
+            ``raise`` rejects it.
         joint: water and roughness, as :class:`rbfrag.solver.stability.joint.OnJoint` has them.
 
     Raises:
-        InputError: shapes that do not go together, or unusable input that was to be refused.
+        InputError: shapes that do not go together, or unusable input that was to be rejected.
     """
     if (drainage := joint.pop("drainage", None)) is not None and "water_m" in joint:
         joint["water_m"] = _undrained(joint["water_m"], drainage)
@@ -172,7 +172,7 @@ def stability_arrays(
     fields = {"beta_deg": beta_deg, "phi_deg": phi_deg, "kv": kv}
     if phi_back_deg is not None:
         fields["phi_back_deg"] = phi_back_deg
-    refuse_half(*(joint.get(name) for name in ("jrc", "jcs_mpa", "joint_length_m")))
+    reject_half(*(joint.get(name) for name in ("jrc", "jcs_mpa", "joint_length_m")))
     on_base = {"cohesion_pa": cohesion_pa, **joint}
     strength: dict[str, Any] = {n: value for n, value in on_base.items() if value is not None}
     if strength:

@@ -264,7 +264,7 @@ AFLOAT = (
 )
 
 
-def refuse_half(jrc: object, jcs_mpa: object, joint_length_m: object) -> None:
+def reject_half(jrc: object, jcs_mpa: object, joint_length_m: object) -> None:
     """Reject an incomplete roughness.
 
     Raises:

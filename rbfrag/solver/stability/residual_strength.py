@@ -62,14 +62,14 @@ def after_first_slip(
     Raises:
         InputError: no earthquake decides about the block, or it does not stand on what is left.
     """
-    from rbfrag.solver.stability.single import refuse_undecided, stability
+    from rbfrag.solver.stability.single import require_stable, stability
 
     keywords = dict(planes)
     residual_deg = keywords.pop("phi_residual_deg", None)
     if residual_deg is None:
         return keywords, ()
     first = stability(block, **keywords)
-    refuse_undecided(first)
+    require_stable(first)
     remaining = {name: value for name, value in keywords.items() if name not in ENDED}
     remaining["phi_deg"] = residual_deg
     if stability(block, **remaining).yield_acceleration <= 0.0:
@@ -78,7 +78,7 @@ def after_first_slip(
     return remaining, (AFTER_SLIP,)
 
 
-def refuse_before_slip(block: Block, planes: Mapping[str, Any], kind: str | None) -> None:
+def reject_before_slip(block: Block, planes: Mapping[str, Any], kind: str | None) -> None:
     """Reject a simulation in time with contributions that end at the first slip.
 
     Args:

@@ -35,7 +35,7 @@ from rbfrag.solver.stability.joint import (
     JointStrength,
     OnJoint,
     is_drained,
-    refuse_half,
+    reject_half,
     roughened,
     roughness_at,
     water_at,
@@ -330,7 +330,7 @@ def judged(
         planes = _wet(block, planes, water_m, density_kg_m3, back_fracture)
     strength = None
     jrc, jcs_mpa, length_m = (joint.get(name) for name in ("jrc", "jcs_mpa", "joint_length_m"))
-    refuse_half(jrc, jcs_mpa, length_m)
+    reject_half(jrc, jcs_mpa, length_m)
     if jrc is not None:
         planes, strength = _rough(block, planes, phi_deg, jrc, jcs_mpa, length_m, density_kg_m3)
         phi_deg = strength.secant_deg
@@ -460,7 +460,7 @@ def level_rectangle(p2: float, kr: float) -> tuple[Block, Stability]:
     return block, stability(block, beta_deg=0.0, phi_deg=rough, back_fracture=False)
 
 
-def refuse_undecided(judged: Stability) -> None:
+def require_stable(judged: Stability) -> None:
     """Reject a block that fails or is locked at rest, whatever the ground motion.
 
     Raises:

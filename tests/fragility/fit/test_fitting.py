@@ -196,24 +196,24 @@ def test_guessed_and_few_earthquakes_are_warned_of(draw):
          "0 critical values"),
     ],
 )  # fmt: skip
-def test_data_that_cannot_carry_a_fit_are_refused(draw, change, words):
+def test_data_that_cannot_carry_a_fit_are_rejected(draw, change, words):
     with pytest.raises(FitError, match=words):
         fit(change(draw(events=5)), term="pgv", method="wls")
 
 
-def test_no_scatter_is_refused_by_the_method_that_is_chosen_too(draw):
+def test_no_scatter_is_rejected_by_the_method_that_is_chosen_too(draw):
     table = draw(events=5)
     with pytest.raises(FitError, match="exactly on a power law"):
         fit(replace(table, y_m_s=0.7 * table.pgv_m_s), term="pgv")
 
 
-def test_no_mean_period_at_all_is_refused(draw):
+def test_no_mean_period_at_all_is_rejected(draw):
     table = draw(events=5)
     with pytest.raises(FitError, match=r"requires the mean period.*fit the term pgv"):
         fit(replace(table, tm_s=np.full(table.p2.size, np.nan)), term="pga_tm")
 
 
-def test_unknown_names_are_refused(table):
+def test_unknown_names_are_rejected(table):
     with pytest.raises(InputError, match=r"unknown method 'ols': use one of .*wls"):
         fit(table, term="pgv", method="ols")
     with pytest.raises(InputError, match="unknown intensity term"):
@@ -224,7 +224,7 @@ def test_unknown_names_are_refused(table):
         fit(table, term="pgv", seed=-1)
 
 
-def test_a_database_without_critical_values_is_refused(tmp_path):
+def test_a_database_without_critical_values_is_rejected(tmp_path):
     with (
         opened_database(tmp_path / "empty.db", create=True) as engine,
         engine.connect() as connection,

@@ -129,7 +129,9 @@ def test_rows_without_magnitude_are_left_out_of_forms_with_it() -> None:
 @pytest.mark.parametrize(
     ("kind", "term"), [("toppling", "pgv"), ("sliding", "pgv"), ("slumping", "pgv_pga")]
 )
-def test_a_database_without_such_campaigns_is_refused(kind: str, term: str, tmp_path: Path) -> None:
+def test_a_database_without_such_campaigns_is_rejected(
+    kind: str, term: str, tmp_path: Path
+) -> None:
     place = tmp_path / "empty.db"
     with (
         opened_database(place, create=True) as engine,
@@ -139,7 +141,7 @@ def test_a_database_without_such_campaigns_is_refused(kind: str, term: str, tmp_
         fit(connection, kind=kind, term=term)
 
 
-def test_what_does_not_go_together_is_refused() -> None:
+def test_what_does_not_go_together_is_rejected() -> None:
     source = drawn("sliding", "pgv_pga", n=100)
     with pytest.raises(InputError, match="unknown kind 'falling'"):
         fit(source, kind="falling", term="pgv")

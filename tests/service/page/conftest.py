@@ -119,7 +119,7 @@ class Opened:
 
     page: Page
     requests: list[str] = field(default_factory=list)
-    refused: list[str] = field(default_factory=list)
+    rejected: list[str] = field(default_factory=list)
     complaints: list[str] = field(default_factory=list)
 
     def settled(self) -> Page:
@@ -154,7 +154,7 @@ def open_page(browser: Browser, service: str) -> Iterator[Callable[..., Opened]]
             if request.url.startswith((service, "blob:", "data:")):
                 route.continue_()
             else:
-                opened.refused.append(request.url)
+                opened.rejected.append(request.url)
                 route.abort()
 
         context.route("**/*", local_only)
@@ -172,5 +172,5 @@ def open_page(browser: Browser, service: str) -> Iterator[Callable[..., Opened]]
     for context in contexts:
         context.close()
     for opened in every:
-        assert opened.refused == [], "the page asked another host"
+        assert opened.rejected == [], "the page asked another host"
         assert opened.complaints == [], "the browser complained"

@@ -14,7 +14,7 @@ def listed(answer):
     return [*labelled(Diagnostic(d["text"], d["code"]) for d in answer["diagnostics"])]
 
 
-REFUSED = "Failed to load resource: the server responded with a status of 422"
+REJECTED = "Failed to load resource: the server responded with a status of 422"
 
 
 def forgive(opened, words):
@@ -97,7 +97,7 @@ def test_what_is_wrong_is_said_beside_its_field(open_page, field, text, words):
     expect(page.locator(f"#{field}-error")).to_have_text("")
     opened.settled()
     assert probability_shown(page) == FIRST_ANSWER
-    forgive(opened, REFUSED)
+    forgive(opened, REJECTED)
 
 
 def test_an_old_answer_never_replaces_a_newer_one(open_page, ask):
@@ -131,13 +131,13 @@ def test_what_the_chart_lacks_takes_no_answer_away(open_page):
     page = opened.page
     problem = '{"title": "Too large", "status": 413, "detail": "too many rows for this service"}'
 
-    def refuse_arrays(route):
+    def reject_arrays(route):
         if route.request.method == "POST":
             route.fulfill(status=413, content_type="application/problem+json", body=problem)
         else:
             route.continue_()
 
-    page.context.route("**/v1/predict", refuse_arrays)
+    page.context.route("**/v1/predict", reject_arrays)
     page.fill("#p2", "4")
     expect(page.locator("#chart-caption")).to_contain_text("too many rows for this service")
     expect(page.locator("#curve-caption")).to_contain_text("too many rows for this service")
@@ -318,7 +318,7 @@ def test_a_decimal_comma_is_a_point(open_page, ask, typed, read):
 
 
 @pytest.mark.parametrize("typed", ["1,000", "1.000,5", "1 000", "1'000", "12,500", "1,000,000"])
-def test_what_may_be_thousands_is_refused(open_page, typed):
+def test_what_may_be_thousands_is_rejected(open_page, typed):
     opened = open_page()
     page = opened.page
     page.fill("#pgv", typed)
@@ -329,7 +329,7 @@ def test_what_may_be_thousands_is_refused(open_page, typed):
     page.fill("#pgv", "0.6")
     opened.settled()
     assert probability_shown(page) == FIRST_ANSWER
-    forgive(opened, REFUSED)
+    forgive(opened, REJECTED)
 
 
 def test_each_field_explains_itself(open_page):
@@ -377,7 +377,7 @@ def test_a_link_is_text_and_never_markup(open_page):
     page = opened.page
     expect(page.locator("#model-error")).to_contain_text("<img src=x")
     assert page.locator("main img").count() == 0
-    forgive(opened, REFUSED)
+    forgive(opened, REJECTED)
 
 
 def test_a_free_standing_block_is_answered_by_its_own_models(open_page, ask):
@@ -408,7 +408,7 @@ def test_a_wrong_restitution_is_said_beside_its_field(open_page):
     expect(opened.page.locator("#restitution-error")).to_contain_text(
         "Coefficient of restitution e = 1.5"
     )
-    forgive(opened, REFUSED)
+    forgive(opened, REJECTED)
 
 
 def test_half_of_a_number_is_not_asked(open_page):
@@ -434,4 +434,4 @@ def test_half_of_a_number_is_not_asked(open_page):
     page.keyboard.press("0")
     page.keyboard.press("Tab")  # now it is said that k_r is 0
     expect(page.locator("#kr-error")).not_to_be_empty()
-    forgive(opened, REFUSED)
+    forgive(opened, REJECTED)

@@ -4,7 +4,7 @@ import pytest
 from axe_playwright_python.sync_playwright import Axe
 from playwright.sync_api import expect
 
-from tests.service.page.test_page_answers import REFUSED, forgive
+from tests.service.page.test_page_answers import REJECTED, forgive
 
 AXE = Axe()
 
@@ -54,7 +54,7 @@ def test_empty_fields_and_wrong_ones(open_page, scheme):
     opened = open_page("?height=&width=abc&pgv=", color_scheme=scheme)
     expect(opened.page.locator(".field .error:not(:empty)")).not_to_have_count(0)
     check(opened.page)
-    forgive(opened, REFUSED)
+    forgive(opened, REJECTED)
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])

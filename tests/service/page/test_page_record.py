@@ -152,7 +152,7 @@ def test_a_record_is_chosen_by_keyboard(open_page, tmp_path):
     expect(page.locator("#spectrum-part")).to_be_hidden()
 
 
-def test_a_file_that_is_no_record_is_refused_in_words(open_page):
+def test_a_file_that_is_no_record_is_rejected_in_words(open_page):
     opened = open_page()
     page = opened.page
     drop(page, "shopping.txt", "bread\nbutter\n")

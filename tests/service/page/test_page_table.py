@@ -69,7 +69,7 @@ def test_each_row_comes_back_with_its_answer(open_page, dropped):
         ("height,width,dip quality\n2,1,5\n", "'dip quality' is unknown"),
     ],
 )
-def test_a_table_that_cannot_be_read_is_refused(open_page, text, said):
+def test_a_table_that_cannot_be_read_is_rejected(open_page, text, said):
     opened = open_page()
     page = opened.page
     page.fill("#table-text", text)

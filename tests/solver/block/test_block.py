@@ -176,13 +176,13 @@ def test_polygons_that_are_no_block(change: dict[str, Any], words: list[str]) ->
         "vertices_m": SQUARE, "heel": 0, "back": 3, "toe": 1, "gamma_deg": 90.0,
     }  # fmt: skip
     Block.from_polygon(**arguments)
-    with pytest.raises(InputError) as refused:
+    with pytest.raises(InputError) as rejected:
         Block.from_polygon(**arguments | change)
     for word in words:
-        assert word in str(refused.value)
+        assert word in str(rejected.value)
 
 
-def test_a_vertex_below_the_base_is_refused() -> None:
+def test_a_vertex_below_the_base_is_rejected() -> None:
     corners = [(0.0, 0.0), (0.5, -0.2), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)]
     with pytest.raises(InputError, match="below the base plane"):
         Block.from_polygon(corners, heel=0, back=4, toe=2, gamma_deg=90.0)
@@ -220,9 +220,9 @@ def test_contact_tolerance_is_a_thousandth_of_the_size() -> None:
     ],
 )
 def test_angles_that_are_no_block(alpha1: Any, alpha3: Any, r3: Any, word: str) -> None:
-    with pytest.raises(InputError) as refused:
+    with pytest.raises(InputError) as rejected:
         Block.from_angles(alpha1, alpha3, r3)
-    assert word in str(refused.value)
+    assert word in str(rejected.value)
 
 
 @pytest.mark.parametrize(
@@ -238,9 +238,9 @@ def test_angles_that_are_no_block(alpha1: Any, alpha3: Any, r3: Any, word: str) 
     ],
 )
 def test_fractures_that_are_no_block(s1: Any, s2: Any, gamma: Any, word: str) -> None:
-    with pytest.raises(InputError) as refused:
+    with pytest.raises(InputError) as rejected:
         Block.from_fractures(s1, s2, gamma)
-    assert word in str(refused.value)
+    assert word in str(rejected.value)
 
 
 def test_a_polygon_has_no_mirror_image_of_its_own() -> None:

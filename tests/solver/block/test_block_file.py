@@ -1,4 +1,4 @@
-"""Block files: the three descriptions, both forms, and what is refused with its line."""
+"""Block files: the three descriptions, both forms, and what is rejected with its line."""
 
 from __future__ import annotations
 
@@ -113,10 +113,10 @@ def test_a_byte_order_mark_and_windows_lines(tmp_path: Path) -> None:
 )
 def test_files_that_are_no_block(tmp_path: Path, name: str, text: str, words: list[str]) -> None:
     path = write(tmp_path, name, text)
-    with pytest.raises(InputError) as refused:
+    with pytest.raises(InputError) as rejected:
         read_block(path)
     for word in words:
-        assert word in str(refused.value)
+        assert word in str(rejected.value)
 
 
 def test_files_that_cannot_be_read(tmp_path: Path) -> None:

@@ -115,7 +115,7 @@ def doubled_and_one(x: float) -> float:
     return doubled(x) + 1.0
 
 
-def test_a_kernel_without_an_entry_refuses_a_call_from_python() -> None:
+def test_a_kernel_without_an_entry_rejects_a_call_from_python() -> None:
     assert doubled_and_one(2.0) == 5.0
     with pytest.raises(TypeError, match="doubled is called by other kernels only"):
         doubled(2.0)

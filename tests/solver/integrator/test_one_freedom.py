@@ -60,7 +60,7 @@ def test_harmonics_are_the_functions_that_they_stand_for(
     assert (arm.x(x), arm.y(x)) == pytest.approx((turned.real, turned.imag), abs=1e-13)
 
 
-def test_harmonics_above_the_third_are_refused() -> None:
+def test_harmonics_above_the_third_are_rejected() -> None:
     with pytest.raises(ValueError, match="harmonics above 3"):
         cosine() * sine() * cosine() * sine()
 

@@ -248,7 +248,7 @@ def test_the_shorter_component_drops_to_zero_at_its_last_sample() -> None:
     assert swapped.w.tolist() == [1.0, 1.3, 1.5, 1.0, 1.0, 1.0]
 
 
-def test_a_block_too_small_to_be_meant_is_refused() -> None:
+def test_a_block_too_small_to_be_meant_is_rejected() -> None:
     motion = GroundMotion(np.array([0.0, 0.3, 0.0]), 0.1)
     with pytest.raises(InputError, match="p2 = 1e\\+30"):
         respond(motion, p2=1e30, kr=0.1)

@@ -238,21 +238,21 @@ def test_order_is_kept_where_no_pull_follows_a_push_of_inverse_size() -> None:
 
 def test_answers_without_proof_are_still_toppling_and_say_why() -> None:
     rng = np.random.default_rng(2)
-    refused = 0
+    rejected = 0
     for seed in range(8):
         motion = noise(seed, pga_g=3.0)
         result = critical(motion, p2=8.0, search_limit=0.05)
         excited = excitation(motion)
         assert contradictions(result, excited, 10, rng) == []
         if not result.certified:
-            refused += 1
+            rejected += 1
             assert any("not certified" in sentence for sentence in result.warnings)
             assert result.undecided is not None
             assert result.undecided > 1e-9
         if result.status == "found":
             assert result.kr is not None
             assert simulate(excited, p2=8.0, kr=result.kr).outcome == TOPPLED
-    assert refused > 0
+    assert rejected > 0
 
 
 @pytest.mark.parametrize(

@@ -235,12 +235,12 @@ def test_scales_too_close_to_failure_lie_inside_the_bracket() -> None:
         ({"scan_ratio": 1.0}, "above 1"),
     ],
 )
-def test_what_cannot_be_searched_is_refused(options: dict[str, object], words: str) -> None:
+def test_what_cannot_be_searched_is_rejected(options: dict[str, object], words: str) -> None:
     with pytest.raises(InputError, match=words):
         search(shaking(), slump(), **options)
 
 
-def test_a_block_that_slumps_at_rest_is_refused() -> None:
+def test_a_block_that_slumps_at_rest_is_rejected() -> None:
     with pytest.raises(InputError, match="unstable at rest"):
         critical(shaking(), block=slump(), beta_deg=29.0, phi_deg=30.0)
 

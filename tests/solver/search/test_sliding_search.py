@@ -120,7 +120,7 @@ def test_what_never_slides_so_far_says_so() -> None:
     assert np.isnan(sliding_displacements(motion, [0.1], vertical=thrown)).all()
 
 
-def test_impossible_numbers_are_refused() -> None:
+def test_impossible_numbers_are_rejected() -> None:
     motion, _ = pair(1)
     with pytest.raises(InputError, match="ky_over_pga"):
         sliding_displacements(motion, [0.1, 0.0])

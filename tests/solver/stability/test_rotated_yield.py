@@ -158,9 +158,9 @@ def test_numbers_and_arrays_agree() -> None:
     ],
 )
 def test_limits(function: Any, pair: tuple[float, float], theta: Any, word: str) -> None:
-    with pytest.raises(InputError) as refused:
+    with pytest.raises(InputError) as rejected:
         function(Block.from_angles(*pair, 1.0), theta, beta_deg=0.0, phi_deg=35.0)
-    assert word in str(refused.value)
+    assert word in str(rejected.value)
 
 
 def test_limit_of_free_toppling() -> None:

@@ -1,4 +1,4 @@
-"""Modes, states, margins and refusals of `stability`."""
+"""Modes, states, margins and rejections of `stability`."""
 
 from __future__ import annotations
 
@@ -348,9 +348,9 @@ def test_a_back_contact_below_the_centroid_cannot_hold_a_slump() -> None:
 )
 def test_bad_input(change: dict[str, Any], word: str) -> None:
     block = Block.from_angles(10.0, 40.0, 1.0)
-    with pytest.raises(InputError) as refused:
+    with pytest.raises(InputError) as rejected:
         stability(block, **{"beta_deg": 10.0, "phi_deg": 35.0} | change)
-    assert word in str(refused.value)
+    assert word in str(rejected.value)
 
 
 def test_what_is_no_block() -> None:

@@ -152,7 +152,7 @@ def follow(
     Raises:
         InputError: a block so small that the run would not end in reasonable time.
     """
-    _refuse_endless(mechanism, excitation, turn_max)
+    _reject_endless(mechanism, excitation, turn_max)
     # A run is a chain of phases. Each is one initial value problem of one coordinate x, from
     # `entry` (position, rate and their error bounds at a time of the record) to the event that ends
     # it; its end is the entry of the next phase, error bounds included
@@ -335,7 +335,7 @@ def _joined(parts: list[MotionHistory]) -> MotionHistory:
     )
 
 
-def _refuse_endless(mechanism: Mechanism, excitation: Excitation, turn_max: float) -> None:
+def _reject_endless(mechanism: Mechanism, excitation: Excitation, turn_max: float) -> None:
     equation = mechanism.first.forward
     # an exact step needs no division, whatever the size of the block
     if equation.uniform:

@@ -10,14 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbfrag.db.model_file import ModelRow
-from rbfrag.fragility.checks import outside_domain
-from rbfrag.fragility.intervals import ParameterErrors, quantiles_of
+from rbfrag.fragility.confidence import ParameterErrors, quantiles_of
 from rbfrag.fragility.method import arrays
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.fragility.uncertain import normal_product, scatter_steps
+from rbfrag.fragility.validation import outside_domain
 from rbfrag.hazards.curve import HazardCurve
-from rbfrag.hazards.mass import Grid, Indices, SiteMass, curve_mass, of_sites, under
-from rbfrag.hazards.shaking import LevelShaking
+from rbfrag.hazards.rate_density import Grid, Indices, SiteMass, curve_mass, of_sites, under
+from rbfrag.hazards.shaking import HazardLevel
 from rbfrag.solver.results import FloatArray
 from rbfrag.solver.scatter import fraction, lognormal
 
@@ -455,7 +455,7 @@ def _off_by(values: FloatArray) -> FloatArray:
 def curve_contributions(
     branches: Sequence[HazardCurve],
     weight: FloatArray,
-    shaking: LevelShaking,
+    shaking: HazardLevel,
     blocks: Sequence[KernelBlocks],
 ) -> tuple[FloatArray, FloatArray]:
     """Return the contributions of the levels of a curve to the mean rate of the blocks.

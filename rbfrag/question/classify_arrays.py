@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbfrag.errors import InputError
-from rbfrag.fragility.lookup import block_of
-from rbfrag.question.blocks import (
+from rbfrag.fragility.model_selection import block_of
+from rbfrag.question.classify import (
     Blocks,
     Group,
     InvalidBlocks,
@@ -23,7 +23,7 @@ from rbfrag.question.blocks import (
     read_by_some,
     requested_kind,
 )
-from rbfrag.question.shapes import (
+from rbfrag.question.shape_validation import (
     BOND,
     DENSITY_NOTE,
     DRAINED_NOTE,
@@ -70,7 +70,7 @@ _FACTS = tuple(KINDS.values())
 Indices = NDArray[np.intp]
 
 
-def many_blocks(
+def classify_blocks(
     inputs: Mapping[str, NDArray[np.float64]],
     size: int,
     *,
@@ -106,7 +106,7 @@ def many_blocks(
     used_inputs, unread = (inputs, ()) if rows else read_by_some(inputs)
     sorting = _BlockClassifier(used_inputs, size, rows, pga_g)
     for place, why in wrong.items():
-        _ArrayIssues(sorting, np.array([place])).refuse(True, "{why}", why=why)
+        _ArrayIssues(sorting, np.array([place])).reject(True, "{why}", why=why)
     sorting.state_drainage()
     blocks = sorting.blocks(kinds, modes)
     blocks = blocks._replace(remarks=(*notes, *blocks.remarks), read=blocks.read | planes)
@@ -122,9 +122,9 @@ class _ArrayIssues:
     def __init__(self, classifier: _BlockClassifier, indices: Indices) -> None:
         self.classifier, self.indices = classifier, indices
 
-    def refuse(self, holds: Any, text: str, *_fields: str, **values: Any) -> None:
+    def reject(self, holds: Any, text: str, *_fields: str, **values: Any) -> None:
         # the row, or the element, is the subject of its reason
-        self._keep(self.classifier.refused, holds, text.removeprefix("the block "), values)
+        self._keep(self.classifier.rejected, holds, text.removeprefix("the block "), values)
 
     def unstable(self, holds: Any, text: str, **values: Any) -> None:
         self._keep(self.classifier.unstable, holds, text, values)
@@ -167,7 +167,7 @@ class _BlockClassifier:
         excluded = ("back_fracture", "drainage")
         self.inputs = {name: value for name, value in inputs.items() if name not in excluded}
         self.groups: list[Group] = []
-        self.refused: list[InvalidBlocks] = []
+        self.rejected: list[InvalidBlocks] = []
         self.unstable: list[InvalidBlocks] = []
         self.is_valid = np.ones(size, dtype=np.bool_)
         """Which blocks no reason is known against."""
@@ -202,7 +202,7 @@ class _BlockClassifier:
         return Blocks(
             tuple(self.groups),
             tuple(_about_rows(warning, *rows) for warning, rows in self.remarks.items()),
-            tuple(self.refused),
+            tuple(self.rejected),
             tuple(self.unstable), self.kinds, self.modes,
             frozenset(self.read),
         )  # fmt: skip
@@ -213,7 +213,7 @@ class _BlockClassifier:
         for word in dict.fromkeys(self.drainage.tolist()):
             if word not in DRAINAGES:
                 why = NO_DRAINAGE.format(f"{word}"[:40])
-                issues.refuse(self.drainage == word, "{why}", "drainage", why=why)
+                issues.reject(self.drainage == word, "{why}", "drainage", why=why)
         if "water_m" not in self.inputs and (self.drainage == DRAINED).any():
             raise InputError(DRAINS_NOTHING, fields=("drainage", "water_m"))
 
@@ -239,7 +239,7 @@ class _BlockClassifier:
             indices = np.array(members)
             if kind and kind not in KINDS:
                 text = f"kind = {kind[:40]!r} is unknown; use {', '.join(KINDS)}"
-                _ArrayIssues(self, indices).refuse(True, "{why}", why=text)
+                _ArrayIssues(self, indices).reject(True, "{why}", why=text)
                 continue
             if kind:
                 code = _codes()[kind]
@@ -254,7 +254,7 @@ class _BlockClassifier:
                 text = (
                     f"the block's mode is {words_of_mode(mode[:40])}: {model} model does not apply"
                 )
-                _ArrayIssues(self, indices).refuse(True, "{why}", why=text)
+                _ArrayIssues(self, indices).reject(True, "{why}", why=text)
 
     def _state_free(self, shapes: Sequence[tuple[str, ...]]) -> None:
         """Classify blocks with a coefficient of restitution as free-standing."""
@@ -328,13 +328,13 @@ class _BlockClassifier:
             facts = _FACTS[code]
             selected = indices[(of_these == code) & self.is_valid[indices]]
             if not facts.parameters:
-                _ArrayIssues(self, selected).refuse(True, NO_MODEL, kind=facts.kind)
+                _ArrayIssues(self, selected).reject(True, NO_MODEL, kind=facts.kind)
                 continue
             self.modes[selected] = MODES.index(facts.mode) if facts.mode else -1
             missing = [name for name in facts.parameters if name not in self.inputs]
             if missing:
                 parameters = " and ".join(facts.parameters)
-                _ArrayIssues(self, selected).refuse(
+                _ArrayIssues(self, selected).reject(
                     True,
                     f"the block's mode is {words_of_mode(facts.mode or '')}, and {missing[0]} is "
                     f"missing: a block of kind {facts.kind} is given by {parameters}",
@@ -370,7 +370,7 @@ class _BlockClassifier:
         columns.setdefault("phi_deg", np.full(1, np.nan))
         columns.setdefault("phi_back_deg", columns["phi_deg"])
         if shape != RECTANGLE:
-            issues.refuse(np.isnan(columns["phi_deg"]), FRICTION_MISSING)
+            issues.reject(np.isnan(columns["phi_deg"]), FRICTION_MISSING)
         free_kinds, kinds = np.array([facts.free_standing for facts in _FACTS]), self.kinds[indices]
         is_free = np.where(kinds < 0, ~self.backed[indices], free_kinds[kinds])
         for free_standing in (False, True):
@@ -399,10 +399,10 @@ class _BlockClassifier:
         if "jrc" in columns:
             # what is smooth needs no strength of its walls
             jcs = columns.get("jcs_mpa", np.full(1, np.nan))
-            issues.refuse((strength["jrc"] > 0.0) & np.isnan(jcs), "jcs_mpa is missing", "jcs_mpa")
+            issues.reject((strength["jrc"] > 0.0) & np.isnan(jcs), "jcs_mpa is missing", "jcs_mpa")
             strength["jcs_mpa"] = np.nan_to_num(jcs, nan=1.0)
         if free_standing and "water_m" in strength:
-            issues.refuse(strength.pop("water_m") > 0.0, NO_FRACTURE, "water_m")
+            issues.reject(strength.pop("water_m") > 0.0, NO_FRACTURE, "water_m")
         elif "water_m" in strength:
             # the drained block is a dry one
             drained = self.drainage[indices] == DRAINED
@@ -435,7 +435,7 @@ class _BlockClassifier:
             strength |= {name: np.where(has_residual, 0.0, strength[name]) for name in ended}
             judged_all = stability_arrays(blocks, phi_deg=phi, phi_back_deg=back, **on, **strength)
             fails = has_residual & (judged_all.yield_acceleration <= 0.0)
-            issues.refuse(fails, SLIPS_ON, "phi_residual_deg", **first_slip)
+            issues.reject(fails, SLIPS_ON, "phi_residual_deg", **first_slip)
             issues.remark(has_residual, AFTER_SLIP)
         if "jrc" in strength:
             phi = judged_all.phi_deg
@@ -443,7 +443,7 @@ class _BlockClassifier:
         reasons = np.broadcast_to(judged_all.reason_code, (n,))
         k = np.broadcast_to(judged_all.yield_acceleration, (n,))
         for code in np.unique(reasons[reasons > 0]).tolist():
-            issues.refuse(reasons == code, REASONS[code])
+            issues.reject(reasons == code, REASONS[code])
         self.modes[indices] = codes
         across_m = 2.0 * np.broadcast_to(blocks.r3_m, (n,))
         issues.remark(across_m < LEAST_M, SMALL_BLOCK, value=across_m)
@@ -455,7 +455,7 @@ class _BlockClassifier:
         if "displacement_m" in self.inputs:
             self.read.add("displacement_m")
             displacement = _at(self.inputs["displacement_m"], indices)
-            issues.refuse(taken & ~np.isnan(displacement), FRICTION_MISSING)
+            issues.reject(taken & ~np.isnan(displacement), FRICTION_MISSING)
         width = len(_FACTS) + 1
         pairs = codes.astype(np.intp) * width + self.kinds[indices] + 1
         for pair in np.flatnonzero(np.bincount(pairs[self.is_valid[indices]])).tolist():

@@ -11,8 +11,8 @@ from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
+from rbfrag.fragility.confidence import Quantiles
 from rbfrag.fragility.domain import RATIOS, Ratio
-from rbfrag.fragility.intervals import Quantiles
 from rbfrag.fragility.measures import AMPLIFIED, CREDIBLE, HIGHEST, LOWEST
 from rbfrag.fragility.method import ArrayNamespace
 from rbfrag.fragility.model import LEAST, Answer, FragilityModel
@@ -113,7 +113,7 @@ PARTLY_OUTSIDE = (
 NO_SHAKING = "no shaking"
 
 
-def refusals(
+def rejections(
     values: Mapping[str, Any], needed: Collection[str], signed: Collection[str] = ()
 ) -> Iterator[Remark]:
     """Yield the reasons that make a prediction impossible; `signed` names values that may be
@@ -162,7 +162,7 @@ def answer_with_findings(
     ns: ArrayNamespace,
     *,
     say: Callable[[Any, Remark], None],
-    refuse: Callable[[Any, Remark], None],
+    reject: Callable[[Any, Remark], None],
     unstable: Callable[[Any, Remark], None],
     nothing: Any,
 ) -> Judgement:
@@ -173,14 +173,14 @@ def answer_with_findings(
         needed: names of the values without which there is no answer.
         quantiles: of the confidence level; None for no interval.
         say: called with where a sentence holds, and the finding.
-        refuse: the same for what makes an answer impossible.
+        reject: the same for what makes an answer impossible.
         unstable: the same where a block fails without an earthquake.
         nothing: False, or an array of it in the shape of the values.
     """
     block, term = model.method.block, model.term
     missing = nothing
-    for finding in refusals(inputs, needed, (block.strength, *block.options)):
-        refuse(finding.holds, finding)
+    for finding in rejections(inputs, needed, (block.strength, *block.options)):
+        reject(finding.holds, finding)
         missing = missing | finding.holds
     strength = inputs[block.strength]
     prompt = _prompt(block.strength)
@@ -193,9 +193,9 @@ def answer_with_findings(
         if name in floored:
             floored[name] = ns.maximum(floored[name], LEAST)
     values = block.completed(floored, term, ns)
-    for bound in block.refuses:
+    for bound in block.rejects:
         holds = bound.holds(values) & _not(missing) & _not(at_rest)
-        refuse(holds, Remark(holds, bound.about, values.get(bound.about), bound.text))
+        reject(holds, Remark(holds, bound.about, values.get(bound.about), bound.text))
         missing = missing | holds
     intensity = values["intensity_m_s"]
     for name in ("y_m_s", "intensity_m_s", "displacement_m", "pgv_m_s"):

@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 from rbfrag.errors import InputError, UnknownModelError
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.hazards.curve import CurveKeywords
-from rbfrag.hazards.shaking import LevelShaking
-from rbfrag.question.answers import block_reasons_of, blocks_of_arrays
+from rbfrag.hazards.shaking import HazardLevel
 from rbfrag.question.fields import AnsweringFields, BlockKeywords, V
 from rbfrag.question.keywords import model_for
+from rbfrag.question.predict_arrays import block_reasons_of, blocks_of_arrays
 from rbfrag.solver.results import FloatArray
 
 
@@ -36,7 +36,7 @@ class ModelPart(NamedTuple):
 
 
 def parts_by_model(
-    inputs: Mapping[str, Any], shaking: LevelShaking, answering: AnsweringFields
+    inputs: Mapping[str, Any], shaking: HazardLevel, answering: AnsweringFields
 ) -> tuple[list[ModelPart], tuple[str, ...], NDArray[np.object_]]:
     """Return the blocks grouped by model.
 
@@ -65,12 +65,12 @@ def parts_by_model(
             values = {
                 n: np.broadcast_to(v, indices.shape)[accepted] for n, v in group.numbers.items()
             }
-            _refuse_unknown_magnitudes(values[chosen.method.block.strength], shaking)
+            _reject_unknown_magnitudes(values[chosen.method.block.strength], shaking)
             parts.append(ModelPart(indices[accepted], values, chosen))
     return parts, blocks.remarks, reason
 
 
-def _refuse_unknown_magnitudes(strength: FloatArray, shaking: LevelShaking) -> None:
+def _reject_unknown_magnitudes(strength: FloatArray, shaking: HazardLevel) -> None:
     """Reject blocks that may fail at a PGA below the range of the disaggregation."""
     start, weakest = shaking.magnitudes_from_g, float(strength.min())
     if start is not None and start > weakest:

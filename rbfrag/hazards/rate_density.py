@@ -23,7 +23,7 @@ from scipy.sparse import csr_array
 
 from rbfrag.hazards.curve import HazardCurve
 from rbfrag.hazards.event_set import EventSet, IntArray
-from rbfrag.hazards.shaking import LevelShaking
+from rbfrag.hazards.shaking import HazardLevel
 from rbfrag.solver.integrator.compiled import inner_kernel, kernel
 from rbfrag.solver.results import FloatArray
 
@@ -158,7 +158,7 @@ class SiteMass:
     ends: CurveEnds | None = None
 
 
-def smoothing_of(shaking: LevelShaking) -> tuple[float, Smoothing]:
+def smoothing_of(shaking: HazardLevel) -> tuple[float, Smoothing]:
     """Return the step of the grid and the dispersion for the shaking of a model."""
     if shaking.shift.size == 1:
         return STEP, Smoothing(1, np.ones(1))
@@ -174,7 +174,7 @@ NODES_A_SHIFT = 8
 
 
 def curve_mass(
-    branches: Sequence[Sequence[HazardCurve]], weight: FloatArray, shaking: LevelShaking
+    branches: Sequence[Sequence[HazardCurve]], weight: FloatArray, shaking: HazardLevel
 ) -> SiteMass:
     """Return the rate density under the hazard curves of sites.
 
@@ -281,7 +281,7 @@ def _ends(
 
 
 def event_mass(
-    events: EventSet, name: str, sites: Indices, shaking: LevelShaking
+    events: EventSet, name: str, sites: Indices, shaking: HazardLevel
 ) -> tuple[SiteMass, FloatArray, FloatArray]:
     """Return the rate density of an event set at sites, and u of each row.
 

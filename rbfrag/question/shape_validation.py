@@ -142,7 +142,7 @@ _RADIANS = "{name} = {{value:g}}° is unusually small: is it in radians? Angles 
 class IssueCollector(Protocol):
     """Collects errors and warnings about blocks."""
 
-    def refuse(self, holds: Any, text: str, *fields: str, **values: Any) -> None:
+    def reject(self, holds: Any, text: str, *fields: str, **values: Any) -> None:
         """Reject blocks with a reason.
 
         Args:
@@ -153,7 +153,7 @@ class IssueCollector(Protocol):
         """
 
     def unstable(self, holds: Any, text: str, **values: Any) -> None:
-        """Mark blocks that are unstable at rest; arguments as for `refuse`."""
+        """Mark blocks that are unstable at rest; arguments as for `reject`."""
 
     def remark(self, holds: Any, text: Diagnostic, **values: Any) -> None:
         """Add a warning where a condition holds; the text may contain values."""
@@ -280,12 +280,12 @@ def check_ranges(
         if not is_friction and name != "displacement_m":
             why = "is empty" if columns else "is not a number"
             level = ": enter 0 for a level base" if columns and name == "beta_deg" else ""
-            issues.refuse(unknown, f"{shown} {why}{level}", name)
+            issues.reject(unknown, f"{shown} {why}{level}", name)
         allowed = f"{about.range.words} {about.unit}".rstrip()
         if about.unit == "deg":
             allowed = re.sub(r"(\d+)", r"\1°", about.range.words)
         wrong = f"{shown} must be {allowed}, not {{value:.10g}}"
-        issues.refuse(in_range ^ True ^ unknown, wrong, name, value=value)
+        issues.reject(in_range ^ True ^ unknown, wrong, name, value=value)
 
 
 def check_lengths(lengths: Mapping[str, Any], issues: IssueCollector) -> None:
@@ -363,14 +363,14 @@ def numbers_of_shape(
     forward_at_rest = TOPPLES_AT_REST if mode == "topple" else UNSTABLE_AT_REST
     issues.unstable(k <= 0.0, forward_at_rest, **words, **angles)
     if facts.mode != mode:
-        issues.refuse(judged.taken, FRICTION_MISSING, "phi_deg")
+        issues.reject(judged.taken, FRICTION_MISSING, "phi_deg")
         words["instead"] = _INSTEAD.get(mode, "")
-        issues.refuse(True, OTHER_MODE, "displacement_m", **words)
+        issues.reject(True, OTHER_MODE, "displacement_m", **words)
         return {}
     if not facts.parameters:
-        issues.refuse(True, NO_MODEL_OF_MODE, **words)
+        issues.reject(True, NO_MODEL_OF_MODE, **words)
         return {}
-    issues.refuse(k == math.inf, LOCKED_AT_REST, **words)
+    issues.reject(k == math.inf, LOCKED_AT_REST, **words)
     issues.remark(judged.wet, UNDRAINED_NOTE)
     single = isinstance(judged.body, Block)
     functions: Elementwise[Any] = SCALAR if single else array_elementwise()
@@ -382,12 +382,12 @@ def numbers_of_shape(
     if mode == "topple" and not facts.free_standing:
         issues.remark(judged.bonded, COHESION_NOTE)
     if slips_on_base(facts):
-        issues.refuse(judged.bonded, COHESIVE, "cohesion_pa", "phi_residual_deg", **words)
-        issues.refuse(judged.rough, ROUGH, "jrc", "phi_residual_deg", **words)
+        issues.reject(judged.bonded, COHESIVE, "cohesion_pa", "phi_residual_deg", **words)
+        issues.reject(judged.rough, ROUGH, "jrc", "phi_residual_deg", **words)
     if judged.pga_g is not None and mode in ("slide", "topple") and not facts.free_standing:
         _say_what_gives_way(judged, issues)
     if "ky" in facts.parameters:
-        issues.refuse(displacement_m != displacement_m, SLIDES, "displacement_m", k=k)
+        issues.reject(displacement_m != displacement_m, SLIDES, "displacement_m", k=k)
         dip_deg = dip_of_factor(judged)
         return {"ky": k, "beta_deg": dip_deg, "displacement_m": displacement_m, **options}
     ignored = Diagnostic(
@@ -396,7 +396,7 @@ def numbers_of_shape(
     issues.remark(displacement_m == displacement_m, ignored)
     if facts.search_needs == "block":  # shape, friction and dip decide how it moves
         p2 = p2_at_rest(judged, functions)
-        issues.refuse(p2 != p2, NO_UNIQUE_MOTION)
+        issues.reject(p2 != p2, NO_UNIQUE_MOTION)
         return {**dict(zip(facts.parameters, (k, p2), strict=True)), **options}
     issues.remark(judged.taken, TAKEN_NOT_TO_SLIP if facts.free_standing else TAKEN_TO_TOPPLE)
     issues.remark((judged.backed ^ True) & stands_free_of(facts, False), _STANDS_FREE)
@@ -410,7 +410,7 @@ def numbers_of_shape(
     )  # fmt: skip
     issues.unstable(forward <= 0.0, TOPPLES_AT_REST, **angles)
     issues.unstable(backward <= 0.0, LEANS_AT_REST, **angles)
-    issues.refuse(least <= 0.0, STEEP)
+    issues.reject(least <= 0.0, STEEP)
     weaker = forward <= backward
     kr = functions.where(weaker, forward, backward)
     uneven = abs(forward - backward) > 1e-6 * (1.0 + forward * backward) * abs(forward)

@@ -10,21 +10,21 @@ import numpy as np
 
 from rbfrag.errors import InputError
 from rbfrag.exchange.block_rows import BlockRows, Blocks, read_blocks
-from rbfrag.fragility.lookup import block_of
+from rbfrag.fragility.invalid_rows import reject_elements
 from rbfrag.fragility.method import TOPPLING_BLOCK
-from rbfrag.fragility.unusable import refuse_elements
-from rbfrag.question.answers import block_reasons_of, blocks_of_arrays
-from rbfrag.question.blocks import (
+from rbfrag.fragility.model_selection import block_of
+from rbfrag.question.classify import (
+    classify_block,
     has_shape,
     kinds_by_numbers,
     numbers_in,
-    one_block,
     taken_as_medians,
 )
+from rbfrag.question.predict_arrays import block_reasons_of, blocks_of_arrays
 from rbfrag.vocabulary.quantities import BLOCK, column_of
 
 
-def given_blocks(
+def collect_blocks(
     inputs: Mapping[str, Any],
     blocks: Blocks | None,
     *,
@@ -46,12 +46,12 @@ def given_blocks(
         missing = next((name for name in TOPPLING_BLOCK.names if name not in fields), "p2")
         raise InputError(f"{missing} is missing: give p2 and kr, or a table of blocks")
     if {"block", "back_fracture"} & {*fields}:
-        described = one_block(fields, kind)
+        described = classify_block(fields, kind)
         (group,) = described.groups
-        rows = given_blocks({**group.numbers, "kind": group.kind}, None, reads=reads)
+        rows = collect_blocks({**group.numbers, "kind": group.kind}, None, reads=reads)
         return replace(rows, remarks=described.remarks)
     reasons = block_reasons_of(*blocks_of_arrays(inputs))
-    refuse_elements(reasons, fields=BLOCK)
+    reject_elements(reasons, fields=BLOCK)
     try:
         arrays = np.broadcast_arrays(*map(np.atleast_1d, fields.values()))
     except ValueError:

@@ -78,7 +78,7 @@ def read_traces(
     """
     rows = [] if metadata is None else metadata.file(file)
     if rows:
-        _refuse_rows_apart(file, rows)
+        _reject_rows_apart(file, rows)
         dt_s = dt_s or rows[0].dt_s
     by_table = _known_unit(rows[0].units) if rows else None
     read = partial(read_motions, file, dt_s=dt_s, allow_partial=allow_partial)
@@ -165,7 +165,7 @@ def _other_unit(units: str | None, file_unit: str | None) -> str:
     return file_unit
 
 
-def _refuse_rows_apart(file: Path, rows: list[TraceMetadata]) -> None:
+def _reject_rows_apart(file: Path, rows: list[TraceMetadata]) -> None:
     """Reject metadata with different units for the traces of one file."""
     for name in ("units", "dt_s"):
         values = {getattr(row, name) for row in rows} - {None}

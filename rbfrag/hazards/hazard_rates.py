@@ -11,18 +11,17 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rbfrag.errors import InputError
-from rbfrag.fragility.intervals import quantiles_of
-from rbfrag.fragility.lookup import stored_rows
-from rbfrag.fragility.unusable import (
+from rbfrag.fragility.confidence import quantiles_of
+from rbfrag.fragility.invalid_rows import (
     FROM_MEAN,
     FROM_SUMS,
+    describe_invalid,
     elements,
-    refuse_elements,
-    unusable_in_words,
+    reject_elements,
 )
-from rbfrag.hazards import between_measures
+from rbfrag.fragility.model_selection import stored_rows
+from rbfrag.hazards import im_uncertainty
 from rbfrag.hazards.annual_rate import checked_years, probability_in
-from rbfrag.hazards.between_measures import LAW_TAU, TAU
 from rbfrag.hazards.branches import (
     Weights,
     branch_curves,
@@ -33,9 +32,12 @@ from rbfrag.hazards.branches import (
 )
 from rbfrag.hazards.curve import CurveKeywords, HazardCurve
 from rbfrag.hazards.curve_file import CurveLike
+from rbfrag.hazards.group_by_model import RateKeywords, parts_by_model
 from rbfrag.hazards.hazard_answer import BranchRate, HazardAnswer
+from rbfrag.hazards.im_uncertainty import LAW_TAU, TAU
 from rbfrag.hazards.joint_rate import JointRate, joint_at_sites
-from rbfrag.hazards.kernel import (
+from rbfrag.hazards.rate_density import Indices, SiteMass, curve_mass
+from rbfrag.hazards.rate_integration import (
     KernelBlocks,
     Rates,
     Run,
@@ -44,9 +46,7 @@ from rbfrag.hazards.kernel import (
     interval_end,
     rates,
 )
-from rbfrag.hazards.mass import Indices, SiteMass, curve_mass
-from rbfrag.hazards.model_parts import RateKeywords, parts_by_model
-from rbfrag.hazards.shaking import NOTABLE, SINGLE_CURVE, LevelShaking, ends_in_words
+from rbfrag.hazards.shaking import NOTABLE, SINGLE_CURVE, HazardLevel, describe_ends
 from rbfrag.question.fields import AnsweringFields
 from rbfrag.question.keywords import LEVEL, parts_of
 from rbfrag.question.question import is_wet, no_drained_bound, without_water
@@ -80,9 +80,10 @@ def hazard(
     """Return the annual rates of failure of blocks under a seismic hazard curve.
 
     λ_f = ∫ P(fails | x) (-dλ), by P on the nodes of a grid against the curve's mass there
-    (:mod:`rbfrag.hazards.kernel`). The interval is that of the model's parameters, by the delta
-    method on ln λ_f. The model is one of the curve's own measure: what else shaking of that level
-    may be is scatter in its P. What a block may be, by its standard deviations, is integrated.
+    (:mod:`rbfrag.hazards.rate_integration`). The interval is that of the model's parameters, by the
+    delta method on ln λ_f. The model is one of the curve's own measure: what else shaking of that
+    level may be is scatter in its P. What a block may be, by its standard deviations, is
+    integrated.
 
     Several blocks stand at one site and share its earthquakes: their rates add up to the failures
     expected a year, and, where asked for, `joint` has the rate of earthquakes in which any of them
@@ -197,9 +198,9 @@ def hazard_at_sites(
     """
     level, first = answering.get("level", LEVEL), [curves[0] for curves in sites]
     checked_years(years)
-    reading = LevelShaking.of(first[0], **meaning)
+    reading = HazardLevel.of(first[0], **meaning)
     by_law = reading.magnitudes_from_g is not None
-    alone = (between_measures.PGA_ALONE,) if reading.name == "pga_g" else ()
+    alone = (im_uncertainty.PGA_ALONE,) if reading.name == "pga_g" else ()
     if alone and answering.get("model") is None:
         named = [row.name for row in stored_rows(answering.get("db")) if row.term == "pga"]
         by_model = f", or accept the bias with model {named[0]}" if named else ""
@@ -209,7 +210,7 @@ def hazard_at_sites(
             fields=("model", "disaggregation"),
         )
     parts, remarks, reason = parts_by_model(inputs, reading, answering)
-    refuse_elements(reason, fields=BLOCK)
+    reject_elements(reason, fields=BLOCK)
     sound = np.asarray(reason == "", dtype=bool)
     where = np.zeros(sound.size, dtype=np.intp) if site is None else site
     branch_weight = np.zeros(len(sites[0]))
@@ -249,14 +250,14 @@ def hazard_at_sites(
         notes = (*(text for text in notes if text != SINGLE_CURVE), *note)
     texts = [
         *remarks,
-        *unusable_in_words(
+        *describe_invalid(
             int((~sound).sum()), sound.size, elements(reason), reason[~sound].tolist(),
             FROM_MEAN if one_class else FROM_SUMS,
         ),
         *notes, *alone,
         *_of_curves(sites), *(note for part in parts for note in part.model.notes),
-        *ends_in_words(first, where, result.rate, *ends[:2], result.ends[0]),
-        *_numbers_in_words(result), *of_joints,
+        *describe_ends(first, where, result.rate, *ends[:2], result.ends[0]),
+        *_describe_numbers(result), *of_joints,
     ]  # fmt: skip
     edges, contribution = np.empty(0), np.empty((0, 0))
     if result.rate.size == 1:
@@ -317,7 +318,7 @@ def _single_component_note(
 ) -> Iterator[Diagnostic]:
     """Yield the note that a single component is assumed, unless RotD50 gives the same period."""
     rotd50: CurveKeywords = {**meaning, "component": "rotd50"}
-    reading = LevelShaking.of(sites[0][0], **rotd50)
+    reading = HazardLevel.of(sites[0][0], **rotd50)
     mass = curve_mass(list(zip(*sites, strict=True)), weight, reading)
     rate = rates(replace(block, median=reading.median), mass, LEVEL).rate
     period = return_period(float(rate[0]))
@@ -442,7 +443,7 @@ def _of_curves(sites: Sequence[Sequence[HazardCurve]]) -> Iterator[str]:
             yield from quantile_warning(curve, "a rate")
 
 
-def _numbers_in_words(result: Rates) -> Iterator[str]:
+def _describe_numbers(result: Rates) -> Iterator[str]:
     worst = np.nan_to_num(result.error[result.rate > NEVER]).max(initial=0.0)
     if worst > NUMERICAL_AIM:
         yield Diagnostic(

@@ -7,7 +7,7 @@ import pytest
 
 from rbfrag.cli.parameters import options
 from rbfrag.errors import InputError
-from rbfrag.exchange.site_join import WITHIN_KM, join_sites
+from rbfrag.exchange.nearest_site import WITHIN_KM, join_sites
 
 DEGREE_KM = np.pi / 180.0 * 6371.0
 

@@ -29,7 +29,7 @@ class OptionConflict(NamedTuple):
     """Options that cannot be combined with certain other options.
 
     Args:
-        options: those that are refused.
+        options: those that are rejected.
         other_options: those that they cannot be combined with.
         why: what to do instead, or why not.
         commands: where this holds; () for all that have both.
@@ -45,7 +45,7 @@ class Need(NamedTuple):
     """Options that require at least one of certain other options.
 
     Args:
-        options: those that are refused.
+        options: those that are rejected.
         other_options: what they need one of.
         goes_with: these others in words.
         why: what to do.
@@ -214,7 +214,7 @@ NEEDS = (
 )
 
 
-def refuse(command: str, used: Collection[str], available: Collection[str]) -> None:
+def reject(command: str, used: Collection[str], available: Collection[str]) -> None:
     """Reject options that cannot be combined.
 
     Args:

@@ -15,7 +15,7 @@ from scipy.stats import norm, t
 from rbfrag.db.location import REFERENCE
 from rbfrag.db.model_file import ModelRow, read_models
 from rbfrag.errors import InputError
-from rbfrag.fragility.intervals import ParameterErrors, packed, quantiles_of, student_half_width
+from rbfrag.fragility.confidence import ParameterErrors, packed, quantiles_of, student_half_width
 from rbfrag.fragility.joint import share_range
 from rbfrag.fragility.method import SINGLE, arrays
 from rbfrag.fragility.methods import methods

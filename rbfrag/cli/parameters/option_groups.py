@@ -13,7 +13,7 @@ from typing import Annotated, Any, NamedTuple, get_type_hints
 import typer
 
 from rbfrag.cli.parameters.completion import model_names
-from rbfrag.cli.parameters.refusals import refuse
+from rbfrag.cli.parameters.option_rules import reject
 from rbfrag.errors import InputError
 from rbfrag.results.diagnostic import Diagnostic
 from rbfrag.vocabulary.quantities import (
@@ -192,8 +192,8 @@ class Stacked:
     """A command whose parameters are option groups.
 
     The command line sees the options, made when it asks for them; the command gets the objects:
-    dataclasses of options, and what was given by field. Options that do not go together are refused
-    before the command runs (:mod:`rbfrag.cli.parameters.refusals`).
+    dataclasses of options, and the inputs by field. Options that do not go together are rejected
+    before the command runs (:mod:`rbfrag.cli.parameters.option_rules`).
     """
 
     def __init__(self, command: Callable[..., None]) -> None:
@@ -229,7 +229,7 @@ class Stacked:
         options = self.__signature__.parameters
         words = {name: word for name in options if (word := _word(options[name]))}
         used = [word for name, word in words.items() if values[name] != options[name].default]
-        refuse(self._command.__name__, used, frozenset(words.values()))
+        reject(self._command.__name__, used, frozenset(words.values()))
         objects = {
             name: make({option: values.pop(option) for option in names})
             for name, (make, names) in self._objects.items()

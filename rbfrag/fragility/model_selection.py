@@ -401,7 +401,7 @@ def _in_memory(db: str | PathLike[str] | None) -> _Store | None:
         try:
             named = os.environ["RBFRAG_DB"] if db is None else os.fspath(db)
         except TypeError:
-            return None  # what reads it refuses it
+            return None  # what reads it rejects it
         return _unchanged(named, False)
     if not _stamp(DEFAULT_NAME, False):
         return _unchanged(_SHIPPED, True)

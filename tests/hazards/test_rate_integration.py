@@ -9,9 +9,9 @@ import pytest
 
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.hazards.curve import HazardCurve, hazard_curve
-from rbfrag.hazards.kernel import KernelBlocks, rates
-from rbfrag.hazards.mass import Grid, curve_mass, under
-from rbfrag.hazards.shaking import LevelShaking
+from rbfrag.hazards.rate_density import Grid, curve_mass, under
+from rbfrag.hazards.rate_integration import KernelBlocks, rates
+from rbfrag.hazards.shaking import HazardLevel
 from rbfrag.question.keywords import model_for
 
 NUMBERS = {"p2": np.array([1.0, 3.0, 10.0]), "kr": np.array([0.06, 0.15, 0.3])}
@@ -22,8 +22,8 @@ def curve(measure: str = "pgv_m_s") -> HazardCurve:
     return hazard_curve(measure, x, 1e-2 * x**-1.5 * np.exp(-x))
 
 
-def blocks(measure: str, component: str) -> tuple[KernelBlocks, LevelShaking]:
-    shaking = LevelShaking.of(curve(measure), component=component)
+def blocks(measure: str, component: str) -> tuple[KernelBlocks, HazardLevel]:
+    shaking = HazardLevel.of(curve(measure), component=component)
     model = model_for({}, ("p2", "kr", measure), "toppling")
     ((_, own),) = KernelBlocks.of(model, shaking.median, NUMBERS, np.zeros(3, dtype=np.intp))
     return own, shaking
@@ -52,7 +52,7 @@ def test_gradients_are_those_of_differences(measure: str, component: str) -> Non
 
 def test_the_mass_is_the_rate_of_the_first_level_with_scatter_and_without() -> None:
     for component in ("single", "rotd50"):
-        shaking = LevelShaking.of(curve(), component=component)
+        shaking = HazardLevel.of(curve(), component=component)
         mass = curve_mass([[curve()]], np.ones(1), shaking)
         assert mass.mass.sum() == pytest.approx(curve().annual_rate[0], rel=1e-6)
     # and of any level on, half of the node that stands on it
@@ -79,12 +79,12 @@ def test_rates_of_random_pairs_are_bounded_and_monotone() -> None:
     for turn in range(100):
         measure, component = ("pgv_m_s", "pga_g")[turn % 2], ("single", "rotd50")[turn // 2 % 2]
         drawn = random_curve(rng, measure)
-        shaking = LevelShaking.of(drawn, component=component)
+        shaking = HazardLevel.of(drawn, component=component)
         p2 = np.exp(rng.uniform(np.log(0.1), np.log(30.0), pairs))
         kr = np.exp(rng.uniform(np.log(0.02), np.log(3.0), pairs))
 
         def annual(
-            curve: HazardCurve, kr: np.ndarray, shaking: LevelShaking = shaking,
+            curve: HazardCurve, kr: np.ndarray, shaking: HazardLevel = shaking,
             measure: str = measure, p2: np.ndarray = p2,
         ) -> np.ndarray:  # fmt: skip
             model = model_for({}, ("p2", "kr", measure), "toppling")

@@ -10,15 +10,15 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rbfrag.errors import InputError, ModelError
-from rbfrag.fragility.lookup import block_of, unused_measures
+from rbfrag.fragility.invalid_rows import block_reasons
 from rbfrag.fragility.measures import MEASURES
 from rbfrag.fragility.model import AT_REST, FragilityModel
-from rbfrag.fragility.prediction import Prediction, answer_given, with_remarks
+from rbfrag.fragility.model_selection import block_of, unused_measures
+from rbfrag.fragility.prediction import Prediction, add_warnings, answer_given
 from rbfrag.fragility.prediction_array import PredictionArray, ReasonPart, Reasons, flat, index_of
-from rbfrag.fragility.unusable import block_reasons
-from rbfrag.question.blocks import Blocks, InvalidBlocks, one_block
-from rbfrag.question.many import many_blocks
-from rbfrag.question.shapes import PLANE_TEXTS
+from rbfrag.question.classify import Blocks, InvalidBlocks, classify_block
+from rbfrag.question.classify_arrays import classify_blocks
+from rbfrag.question.shape_validation import PLANE_TEXTS
 from rbfrag.results.diagnostic import Diagnostic, diagnostics
 from rbfrag.solver.kinds import BY_MECHANICS
 
@@ -72,14 +72,14 @@ def ask_many(
     written = {name: np.broadcast_to(text, shape).ravel() for name, text in planes.items()}
     measures = {name: value for name, value in values.items() if name in MEASURES}
     block: dict[str, Any] = {n: v for n, v in values.items() if n not in {*measures, *texts}}
-    blocks = many_blocks(
+    blocks = classify_blocks(
         {**block, **written}, size, kinds=kind, modes=mode, rows=rows, pga_g=measures.get("pga_g")
     )
     if not rows:
-        _refuse_unread(blocks, block)
+        _reject_unread(blocks, block)
     if weights is not None:
         return _of_draws(blocks, inputs, level, weights, sites, size, find)
-    refused, parts = list(blocks.refused), []
+    rejected, parts = list(blocks.rejected), []
     for group in blocks.groups:
         indices = group.indices
         assert indices is not None
@@ -95,13 +95,13 @@ def ask_many(
         except (InputError, ModelError) as error:
             if len(blocks.groups) == 1:
                 raise
-            refused.append(InvalidBlocks(indices, str(error), {}))
+            rejected.append(InvalidBlocks(indices, str(error), {}))
             continue
         assert isinstance(answer, PredictionArray)
-        parts.append((indices, with_remarks(answer, unused_measures(chosen, group_inputs))))
+        parts.append((indices, add_warnings(answer, unused_measures(chosen, group_inputs))))
     if nan == "raise":
-        _refuse(refused, parts, blocks, shape)
-    return _together(parts, refused, blocks, shape, level, index_of(numbers))
+        _reject(rejected, parts, blocks, shape)
+    return _together(parts, rejected, blocks, shape, level, index_of(numbers))
 
 
 def blocks_of_arrays(inputs: Mapping[str, Any]) -> tuple[Blocks, int]:
@@ -117,7 +117,7 @@ def blocks_of_arrays(inputs: Mapping[str, Any]) -> tuple[Blocks, int]:
     block_fields = {name: value for name, value in inputs.items() if value is not None}
     kind = block_fields.pop("kind", None)
     if "block" in block_fields:
-        return one_block(block_fields, kind), 1
+        return classify_block(block_fields, kind), 1
     kinds = {} if kind is None or isinstance(kind, str) else {"kind": np.zeros(len(kind))}
     planes = {
         name: np.array(block_fields.pop(name), dtype=object)
@@ -129,13 +129,13 @@ def blocks_of_arrays(inputs: Mapping[str, Any]) -> tuple[Blocks, int]:
     size = int(np.prod(shape))
     numbers: dict[str, Any] = {name: values[name] for name in block_fields}
     numbers |= {name: np.broadcast_to(text, shape).ravel() for name, text in planes.items()}
-    blocks = many_blocks(numbers, size, kinds=kind)
+    blocks = classify_blocks(numbers, size, kinds=kind)
     if not kinds:  # of a table that states the kinds, others may read what these do not
-        _refuse_unread(blocks, block_fields)
+        _reject_unread(blocks, block_fields)
     return blocks, size
 
 
-def _refuse_unread(blocks: Blocks, names: Collection[str]) -> None:
+def _reject_unread(blocks: Blocks, names: Collection[str]) -> None:
     unread = [name for name in names if name not in blocks.read]
     if unread and blocks.groups:
         kinds = " or ".join(dict.fromkeys(str(group.kind) for group in blocks.groups))
@@ -147,7 +147,7 @@ def _refuse_unread(blocks: Blocks, names: Collection[str]) -> None:
 def block_reasons_of(blocks: Blocks, size: int) -> NDArray[np.object_]:
     """Return why blocks cannot fail in an earthquake, shape (m,); an empty text where they can."""
     reasons = np.full(size, "", dtype=object)
-    for invalid in (*blocks.refused, *blocks.unstable):
+    for invalid in (*blocks.rejected, *blocks.unstable):
         reasons[invalid.indices] = invalid.texts()
     for group in blocks.groups:
         indices = np.arange(size) if group.indices is None else group.indices
@@ -156,15 +156,15 @@ def block_reasons_of(blocks: Blocks, size: int) -> NDArray[np.object_]:
     return reasons
 
 
-def _refuse(
-    refused: Sequence[InvalidBlocks],
+def _reject(
+    rejected: Sequence[InvalidBlocks],
     parts: Sequence[tuple[NDArray[np.intp], PredictionArray]],
     blocks: Blocks,
     shape: tuple[int, ...],
 ) -> None:
     """Reject the first element without a prediction, or that is unstable at rest."""
     reasons: dict[int, str] = {}
-    for invalid in refused:
+    for invalid in rejected:
         reasons |= dict(zip(invalid.indices.tolist(), invalid.texts().tolist(), strict=True))
     for indices, answer in parts:
         missing = np.flatnonzero(np.isnan(answer.probability) | (answer.reason == "unstable"))
@@ -191,7 +191,7 @@ def _of_draws(
     groups = [group for group in blocks.groups if group.indices is not None]
     if len(groups) != 1 or groups[0].indices is None or groups[0].indices.size != size:
         at_rest = sum(invalid.indices.size for invalid in blocks.unstable)
-        first = next((f": {invalid.texts()[0]}" for invalid in blocks.refused), "")
+        first = next((f": {invalid.texts()[0]}" for invalid in blocks.rejected), "")
         kinds = " and ".join(str(group.kind) for group in groups) or "none"
         raise InputError(
             f"all draws of a block must have one kind, not {kinds}"
@@ -202,12 +202,12 @@ def _of_draws(
     group_inputs = {**group.numbers, **{name: inputs[name] for name in inputs if name in MEASURES}}
     chosen = find(group_inputs, group.kind)
     answer = answer_given(chosen, group_inputs, level, weights=weights, sites=sites)
-    return with_remarks(answer, unused_measures(chosen, group_inputs))
+    return add_warnings(answer, unused_measures(chosen, group_inputs))
 
 
 def _together(
     parts: Sequence[tuple[NDArray[np.intp], PredictionArray]],
-    refused: Sequence[InvalidBlocks],
+    rejected: Sequence[InvalidBlocks],
     blocks: Blocks,
     shape: tuple[int, ...],
     level: float,
@@ -227,7 +227,7 @@ def _together(
     for at, part in parts:
         in_domain[at] = part.in_domain
         reasons += [(at[indices], texts) for indices, texts in part.reasons.parts]
-    reasons += [(entry.indices, entry.texts) for entry in refused]
+    reasons += [(entry.indices, entry.texts) for entry in rejected]
     ruled: list[ReasonPart] = [(at, partial(getattr, part, "how")) for at, part in parts]
     nothing = np.empty(0, dtype=np.intp)
     unstable = np.concatenate([nothing, *(entry.indices for entry in blocks.unstable)])

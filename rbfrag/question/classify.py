@@ -1,6 +1,6 @@
 """Classification of a single block: failure mode, kind and model inputs, from numbers or geometry.
 
-One block is refused with the reason; of many, each that cannot be used keeps its own, and one that
+One block is rejected with the reason; of many, each that cannot be used keeps its own, and one that
 falls at rest is known to fail. A single block loads no numpy.
 """
 
@@ -11,8 +11,8 @@ from collections.abc import Collection, Mapping
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from rbfrag.errors import InputError
-from rbfrag.fragility.lookup import block_of, check_numbers
-from rbfrag.question.shapes import (
+from rbfrag.fragility.model_selection import block_of, check_numbers
+from rbfrag.question.shape_validation import (
     BOND,
     DENSITY_NOTE,
     DRAINED_NOTE,
@@ -110,7 +110,7 @@ class Blocks(NamedTuple):
     Args:
         groups: those that a model may answer for.
         remarks: what is to be said of all of them.
-        refused: those that cannot be used.
+        rejected: those that cannot be used.
         unstable: those that fall at rest.
         kinds: kind of each, a place in ``KINDS``, -1 for none; None where all are of one group.
         modes: failure mode of each, a place in :data:`MODES`, -1 where that is not known.
@@ -120,7 +120,7 @@ class Blocks(NamedTuple):
 
     groups: tuple[Group, ...]
     remarks: tuple[Diagnostic, ...] = ()
-    refused: tuple[InvalidBlocks, ...] = ()
+    rejected: tuple[InvalidBlocks, ...] = ()
     unstable: tuple[InvalidBlocks, ...] = ()
     kinds: NDArray[np.int8] | None = None
     modes: NDArray[np.int8] | None = None
@@ -313,7 +313,7 @@ class _ScalarIssues:
         self.remarks: list[Diagnostic] = []
         self._suspicious = suspicious
 
-    def refuse(self, holds: Any, text: str, *fields: str, **values: Any) -> None:
+    def reject(self, holds: Any, text: str, *fields: str, **values: Any) -> None:
         if holds:
             text = "; ".join((text.format(**values), *self._suspicious))
             raise InputError(text, fields=(*fields, *PLANES))
@@ -349,7 +349,7 @@ def read_by_some(inputs: Mapping[str, Any]) -> tuple[Mapping[str, Any], tuple[Di
     return {name: value for name, value in inputs.items() if name in used_names}, tuple(remarks)
 
 
-def one_block(
+def classify_block(
     inputs: Mapping[str, Any],
     kind: str | None = None,
     pga_g: float | None = None,

@@ -1,8 +1,8 @@
 """Invalid rows of block tables: the reason for each, their number and the messages.
 
 Every command that takes many blocks answers those that it can, gives the others NaN and the reason,
-and says by :func:`unusable_in_words` how many they are. An answer that needs all of them, or a
-table of which none can be used, is refused by :func:`refuse`.
+and says by :func:`describe_invalid` how many they are. An answer that needs all of them, or a
+table of which none can be used, is rejected by :func:`reject`.
 """
 
 from __future__ import annotations
@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbfrag.errors import InputError
-from rbfrag.fragility.checks import Remark, refusals
 from rbfrag.fragility.method import BlockParameters, arrays
+from rbfrag.fragility.validation import Remark, rejections
 from rbfrag.results.diagnostic import Diagnostic
 
 FROM_SUMS = " and are left out of all sums, which are lower bounds"
@@ -51,7 +51,7 @@ def block_reasons(
     names = [name for name in (*block.options, *block.sigmas) if name in values]
     with np.errstate(all="ignore"):
         filled = block.filled(values)
-        for finding in refusals(filled, (*block.names, *names), (block.strength, *block.options)):
+        for finding in rejections(filled, (*block.names, *names), (block.strength, *block.options)):
             say(finding.holds, finding)
         at_rest = Remark(
             filled[block.strength] <= 0.0, block.strength, filled[block.strength],
@@ -61,7 +61,7 @@ def block_reasons(
         adjusted = dict(filled)
         if block.adjust is not None:
             block.adjust(adjusted, arrays())
-        for bound in block.refuses:
+        for bound in block.rejects:
             if bound.about in names:
                 finding = Remark(
                     bound.holds(adjusted), bound.about, filled[bound.about], bound.text
@@ -70,7 +70,7 @@ def block_reasons(
     return reasons
 
 
-def unusable_in_words(
+def describe_invalid(
     count: int, total: int, labels: Sequence[str], reasons: Sequence[str], effect: str = ""
 ) -> tuple[Diagnostic, ...]:
     """Describe the rejected blocks; empty if there are none.
@@ -90,7 +90,7 @@ def unusable_in_words(
     return (Diagnostic(text, "rows_rejected"),)
 
 
-def refuse(
+def reject(
     source: str, labels: Sequence[str], reasons: Sequence[str], total: int, why: str = ""
 ) -> NoReturn:
     """Reject a table in which some or all blocks are invalid.
@@ -113,7 +113,7 @@ def refuse(
     )
 
 
-def refuse_elements(
+def reject_elements(
     reasons: NDArray[np.object_], why: str = "", fields: Collection[str] = ()
 ) -> None:
     """Reject arrays with invalid elements; without `why` only if all are invalid.
@@ -127,7 +127,7 @@ def refuse_elements(
     if reasons.size == 1 and wrong:
         raise InputError(reasons[0], fields=fields)
     if wrong and (why or len(wrong) == reasons.size):
-        refuse("blocks", wrong, [text for text in reasons.tolist() if text], reasons.size, why)
+        reject("blocks", wrong, [text for text in reasons.tolist() if text], reasons.size, why)
 
 
 def elements(reasons: NDArray[np.object_]) -> list[str]:

@@ -1,4 +1,4 @@
-"""Rates by PGV, by PGA with magnitudes, and what is refused."""
+"""Rates by PGV, by PGA with magnitudes, and what is rejected."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import pytest
 from rbfrag.errors import InputError
 from rbfrag.exchange.event_losses import losses
 from rbfrag.exchange.openquake.events import JobFiles, read_events, read_magnitudes
-from rbfrag.hazards.between_measures import component_of_velocity, factors_between, velocity_of
+from rbfrag.hazards.im_uncertainty import component_of_velocity, factors_between, velocity_of
 from rbfrag.question.components import COMPONENTS
 
 
@@ -57,7 +57,7 @@ def test_magnitudes_of_events_are_those_of_their_ruptures(folder: Path) -> None:
     assert magnitudes.tolist() == [by_number[number] for number in sorted(by_number)]
 
 
-def test_an_event_of_no_rupture_is_refused(folder: Path, tmp_path: Path) -> None:
+def test_an_event_of_no_rupture_is_rejected(folder: Path, tmp_path: Path) -> None:
     lines = (folder / "ruptures_1.csv").read_text().splitlines()
     short = tmp_path / "ruptures.csv"
     short.write_text("\n".join(lines[:-1]) + "\n")

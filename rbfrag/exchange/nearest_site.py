@@ -54,7 +54,8 @@ def join_sites(
         columns: ``block_id`` of n blocks, and, if there are, ``site_id``, and ``lon`` and ``lat``
             [deg].
         names: names of the s sites, empty texts where they have none.
-        coordinates: longitudes and latitudes of the sites [deg], shape (s, 2); NaN or None: unknown.
+        coordinates: longitudes and latitudes of the sites [deg], shape (s, 2); NaN or None
+            where unknown.
         within_km: farthest distance from a block to its site [km].
         of: what there is of the sites, for messages.
 
