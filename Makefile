@@ -46,6 +46,7 @@ docs: $(VENV)/.installed-dev  ## the documentation, into docs/_build/html
 	$(BIN)/python docs/generate_gallery.py --check
 	$(BIN)/python docs/locate_rules.py --check
 	$(BIN)/python docs/draw_architecture.py --check
+	$(BIN)/python docs/measure_structure.py --check
 	$(RUN) sphinx -E -W --keep-going -q -b html docs docs/_build/html
 
 # The folder of matplotlib's settings is given because HOME may not be writable.
@@ -104,6 +105,7 @@ cli-reference: $(VENV)/.installed-dev  ## write anew what is generated: commands
 	$(BIN)/python docs/generate_gallery.py
 	$(BIN)/python docs/locate_rules.py
 	$(BIN)/python docs/draw_architecture.py
+	$(BIN)/python docs/measure_structure.py --write
 
 wheel: $(VENV)/.installed-dev  ## the wheel, into dist/
 	$(RUN) pip wheel --quiet --disable-pip-version-check --no-deps --wheel-dir dist .
