@@ -49,6 +49,33 @@ SMALLEST_FRACTION = 5e-4
 """Contributions below this fraction of a rate are not printed."""
 
 
+def rate_bounds(
+    rate: FloatArray, above: FloatArray, above_at_most: FloatArray, below: FloatArray
+) -> FloatArray:
+    """Return upper bounds of rates [1/yr], shape (m,), of which `rate` are the lower ones.
+
+    Shaking above the last level of a curve fails a block each time at most. NaN where a block
+    fails below the first level, too: a curve gives no rate of weaker shaking.
+
+    Args:
+        rate: rates of failure [1/yr], shape (m,).
+        above: part from beyond the last level, at least [1/yr], shape (m,).
+        above_at_most: the same at most.
+        below: probability of failure at the first level, shape (m,).
+    """
+    return np.where(below > NOTABLE, np.nan, rate + above_at_most - above)
+
+
+def is_truncated(rate: FloatArray, bound: FloatArray) -> NDArray[np.bool_]:
+    """Return where a rate is a range because the curve ends or begins too early, shape (m,).
+
+    Args:
+        rate: rates of failure [1/yr], shape (m,); NaN for a block that cannot be used.
+        bound: their upper bounds, from :func:`rate_bounds`.
+    """
+    return (rate >= 0.0) & ~(bound <= np.maximum(NOTABLE_FACTOR * rate, NEVER))
+
+
 @dataclass(frozen=True, eq=False)
 class BranchRate:
     """Rates of failure under one of several hazard curves.
@@ -190,13 +217,8 @@ class HazardAnswer(Result):
 
     @property
     def upper_bound(self) -> FloatArray:
-        """Upper bounds of the rates [1/yr], shape (m,), of which `annual_rate` are the lower ones.
-
-        Shaking above the last level of a curve fails a block each time at most. NaN where a block
-        fails below the first level, too: a curve gives no rate of weaker shaking.
-        """
-        bound = self.annual_rate + self.above_at_most - self.above
-        return np.where(self.below > NOTABLE, np.nan, bound)
+        """Upper bounds of the rates [1/yr], shape (m,); see :func:`rate_bounds`."""
+        return rate_bounds(self.annual_rate, self.above, self.above_at_most, self.below)
 
     @property
     def expected_failures_upper_bound(self) -> float | None:
@@ -207,8 +229,15 @@ class HazardAnswer(Result):
     @property
     def _is_truncated(self) -> NDArray[np.bool_]:
         """True where the rate is a range because the curve ends or begins too early, shape (m,)."""
-        rate, bound = self.annual_rate, self.upper_bound
-        return (rate >= 0.0) & ~(bound <= np.maximum(NOTABLE_FACTOR * rate, NEVER))
+        return is_truncated(self.annual_rate, self.upper_bound)
+
+    @property
+    def _has_interval(self) -> bool:
+        """True if the sentences print the confidence interval of the rate."""
+        if self._is_single:
+            return not self._is_truncated[0] and float(self.ci_high[0]) > NEVER
+        bound = self.expected_failures_upper_bound
+        return bound is not None and bound <= NOTABLE_FACTOR * self.expected_failures_per_year
 
     def return_period_text(self, index: int) -> str:
         """Return the return period of a block, "840 years", or its range if the curve is too short.
@@ -263,7 +292,7 @@ class HazardAnswer(Result):
     def sentences(self) -> Iterator[str]:
         """Yield the return period of one block, or the expected failures of several."""
         yield from self._of_one_block() if self._is_single else self._of_all_blocks()
-        if self.tau is not None:
+        if self.tau is not None and self._has_interval:
             yield im_uncertainty.in_words(self.tau)
 
     def _of_one_block(self) -> Iterator[str]:

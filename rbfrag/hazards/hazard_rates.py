@@ -33,7 +33,7 @@ from rbfrag.hazards.branches import (
 from rbfrag.hazards.curve import CurveKeywords, HazardCurve
 from rbfrag.hazards.curve_file import CurveLike
 from rbfrag.hazards.group_by_model import RateKeywords, parts_by_model
-from rbfrag.hazards.hazard_answer import BranchRate, HazardAnswer
+from rbfrag.hazards.hazard_answer import BranchRate, HazardAnswer, is_truncated, rate_bounds
 from rbfrag.hazards.im_uncertainty import LAW_TAU, TAU
 from rbfrag.hazards.joint_rate import JointRate, joint_at_sites
 from rbfrag.hazards.rate_density import Indices, SiteMass, curve_mass
@@ -246,7 +246,11 @@ def hazard_at_sites(
     ends = _beyond(result, mass, where)
     notes = reading.warnings
     if SINGLE_CURVE in notes and sound.size == 1:
-        note = _single_component_note(sites, meaning, branch_weight, blocks[0][1], result)
+        bound = rate_bounds(result.rate, *ends[:2], result.ends[0])
+        is_range = bool(is_truncated(result.rate, bound)[0])
+        note = _single_component_note(
+            sites, meaning, branch_weight, blocks[0][1], result, is_range=is_range
+        )
         notes = (*(text for text in notes if text != SINGLE_CURVE), *note)
     texts = [
         *remarks,
@@ -315,14 +319,25 @@ def _single_component_note(
     weight: FloatArray,
     block: KernelBlocks,
     result: Rates,
+    *,
+    is_range: bool,
 ) -> Iterator[Diagnostic]:
-    """Yield the note that a single component is assumed, unless RotD50 gives the same period."""
+    """Yield the note that a single component is assumed, unless RotD50 gives the same period.
+
+    Args:
+        is_range: the curve ends or begins too early: the answer is a range, which would
+            contradict a return period without one.
+    """
     rotd50: CurveKeywords = {**meaning, "component": "rotd50"}
     reading = HazardLevel.of(sites[0][0], **rotd50)
     mass = curve_mass(list(zip(*sites, strict=True)), weight, reading)
     rate = rates(replace(block, median=reading.median), mass, LEVEL).rate
     period = return_period(float(rate[0]))
-    if period != return_period(float(result.rate[0])):
+    if period == return_period(float(result.rate[0])):
+        return
+    if is_range:
+        yield SINGLE_CURVE
+    else:
         yield SINGLE_CURVE.replaced(
             text="the hazard curve is assumed to be of a single horizontal component; as RotD50 "
             f"the return period would be {period}"

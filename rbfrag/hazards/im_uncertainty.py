@@ -71,7 +71,7 @@ def as_dict(tau: float | None) -> dict[str, float] | None:
 def in_words(tau: float) -> str:
     """Return the text on the factors by which another intensity measure may change a rate."""
     low, high = factors_between(tau)
-    return f"Not included in the interval: choice of intensity measure, × {low:.2f}–{high:.2f}"
+    return f"Not included in the interval: choice of intensity measure, rate × {low:.2f}–{high:.2f}"
 
 
 @dataclass(frozen=True)

@@ -248,7 +248,7 @@ class LossAnswer(Result):
                 yield f"{source} {text}{' (5th–95th)' if source == 'logic tree' else ''}"
         if self.tau is not None:
             low, high = im_uncertainty.factors_between(self.tau)
-            yield f"intensity measure × {low:.2f}–{high:.2f}"
+            yield f"choice of intensity measure, rate × {low:.2f}–{high:.2f}"
 
     def lines(self) -> Iterator[TextLine]:
         """Yield the events, their intensity measures, bounds, and the models."""

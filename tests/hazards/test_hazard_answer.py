@@ -36,25 +36,25 @@ def test_one_block_has_a_return_period_with_its_interval() -> None:
         f"Mean annual rate {annual_rate(rate)} /yr; P(failure in 50 years) = "
         f"{with_interval(*(1.0 - math.exp(-50.0 * value) for value in (rate, low, high)))}"
     )
-    assert third.startswith("Not included in the interval: choice of intensity measure, × ")
+    assert third.startswith("Not included in the interval: choice of intensity measure, rate × ")
     drained = replace(answer, drained=np.array([1e-4]))
     assert "Drained return period 10,000 years" in [*drained.sentences()]
 
 
 def test_a_curve_that_ends_early_gives_a_range() -> None:
-    first, second, _ = answered(last=0.7).sentences()
+    first, second = answered(last=0.7).sentences()
     assert first.startswith("Return period of failure between ")
     assert first.endswith("years: the hazard curve ends at PGV = 0.7 m/s")
     assert re.match(
         r"Mean annual rate [\d.e-]+–2.1e-3 /yr; P\(failure in 50 years\) = [\d.–]+ %", second
     )
     # shaking above the last level, at 0.05 m/s and once in 2.5 years, may fail the block each time
-    first, second, _ = answered(last=0.05).sentences()
+    first, second = answered(last=0.05).sentences()
     assert first == (
         "Return period of failure at least 2.5 years: the hazard curve ends at PGV = 0.05 m/s"
     )
     assert second == "Mean annual rate at most 0.4 /yr; P(failure in 50 years) at most 100 %"
-    first, *_, last, _ = answered([3.0, 3.0], 0.1, last=0.7).sentences()
+    first, *_, last = answered([3.0, 3.0], 0.1, last=0.7).sentences()
     assert first.endswith(" /yr of 2 blocks: the hazard curve ends too early")
     assert re.search(r"periods: block 1 \(between 490 and [\d,]+ years\), block 2", last)
 
@@ -96,7 +96,7 @@ def test_a_curve_that_begins_too_late_gives_no_upper_bound() -> None:
 
 
 def test_a_rate_of_never_has_no_interval() -> None:
-    first, second, _ = answered(kr=300.0, last=1e4).sentences()
+    first, second = answered(kr=300.0, last=1e4).sentences()
     assert first == "Return period of failure over 100 million years"
     assert second.endswith("P(failure in 50 years) < 0.01 %")
 
@@ -125,6 +125,10 @@ def test_the_component_is_noted_where_it_matters() -> None:
     alone, rotd50 = (hazard(curve, 3.0, 0.1, model=row, component=c) for c in (None, "rotd50"))
     (note,) = (text for text in alone.warnings if "single horizontal component" in text)
     assert note.endswith(f"as RotD50 the return period would be {rotd50.return_period_text(0)}")
+    # a range is not compared with the return period by another component
+    short = hazard_curve("pgv_m_s", x[:12], 1e-3 * x[:12] ** -2.0)
+    (note,) = (text for text in hazard(short, 3.0, 0.1, model=row).warnings if "RotD50" in text)
+    assert "return period" not in note
     several = hazard(curve, [3.0, 3.0], 0.1, model=row)
     assert any("assumed to be of a single horizontal" in text for text in several.warnings)
     for asked in ({"kr": 300.0}, {"kr": 0.1, "component": "single"}):
