@@ -83,6 +83,7 @@ class AnyRate:
         mean: the mean over the draws of the first of each [1/a].
         outside: part of it from outside the ranges that the model was fitted on.
         beyond: the most that shaking above the last level of the curve may add to the rate [1/a].
+        below: probability of failure at the first level of the curve, the maximum of the blocks.
         warnings: what the ends of the curve leave open.
     """
 
@@ -90,6 +91,7 @@ class AnyRate:
     mean: float
     outside: float
     beyond: float
+    below: float
     warnings: tuple[str, ...]
 
 
@@ -114,7 +116,8 @@ class FragilityBlocks:
         texts = describe_ends([curve], _FIRST_SITE, *(values[:1] for values in ends))
         rates = result.annual_rate[:, None, None]
         beyond = float((result.above_at_most - result.above)[0])
-        return AnyRate(rates, float(rates[0, 0, 0]), 0.0, beyond, tuple(texts))
+        below = float(result.below[0])
+        return AnyRate(rates, float(rates[0, 0, 0]), 0.0, beyond, below, tuple(texts))
 
 
 @dataclass(frozen=True, eq=False)
@@ -235,7 +238,8 @@ class ModelBlocks:
         share = outside.sum() / max(float(rate.sum()), np.finfo(np.float64).tiny)
         mean = float(self.weight @ by_law[0, :, 0])
         above = min(float((most - beyond * last).sum()), beyond)
-        return AnyRate(by_law, mean, float(share), above, tuple(warnings))
+        below = float(first.max())
+        return AnyRate(by_law, mean, float(share), above, below, tuple(warnings))
 
     def _mean(self, values: FloatArray) -> FloatArray:
         """Return the mean over the draws, shape (m,)."""

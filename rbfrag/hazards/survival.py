@@ -17,7 +17,7 @@ from rbfrag.hazards.branches import Weights, branch_curves, curve_name, quantile
 from rbfrag.hazards.curve import CurveKeywords, HazardCurve
 from rbfrag.hazards.curve_file import CurveLike
 from rbfrag.hazards.group_by_model import RateKeywords
-from rbfrag.hazards.hazard_answer import NOTABLE_FACTOR
+from rbfrag.hazards.hazard_answer import NOTABLE_FACTOR, is_truncated
 from rbfrag.hazards.shaking import NOTABLE, HazardLevel
 from rbfrag.hazards.standing_blocks import (
     DEPENDENT,
@@ -32,6 +32,7 @@ from rbfrag.question.keywords import LEVEL, parts_of
 from rbfrag.results.diagnostic import Diagnostic
 from rbfrag.results.numbers import (
     NEVER,
+    SMALLEST,
     confidence,
     equals,
     exact_percent,
@@ -39,6 +40,7 @@ from rbfrag.results.numbers import (
     percent,
     return_period,
     two_digits,
+    years,
 )
 from rbfrag.results.result import Result, TextLine, TextTable
 from rbfrag.solver.kinds import by_model, mode_of_kind
@@ -51,7 +53,7 @@ DRAWS = 128
 REJECTION_LEVEL = 0.05
 """Probability of survival below which a hazard curve is rejected."""
 
-_NOT_IN_JSON = ("standing", "annual_rate_beyond")
+_NOT_IN_JSON = ("standing", "annual_rate_beyond", "curve_end")
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,8 +117,10 @@ class SurvivalAnswer(Result):
         level: confidence level of the interval.
         warnings: what to know about the answer.
         standing: survival for any factor.
-        annual_rate_beyond: the most that shaking above the last level of the curve may add to the
-            rate [1/a].
+        annual_rate_beyond: the most that shaking beyond the levels of the curve may add to the
+            rate [1/a]; infinite where a block fails below the first level, since a curve gives no
+            rate of weaker shaking.
+        curve_end: the level beyond which that is, "the hazard curve ends at PGV = 0.5 m/s".
     """
 
     probability_standing: float
@@ -144,6 +148,7 @@ class SurvivalAnswer(Result):
     warnings: tuple[str, ...]
     standing: Standing = field(repr=False)
     annual_rate_beyond: float = 0.0
+    curve_end: str = ""
 
     @property
     def mode(self) -> str:
@@ -151,13 +156,16 @@ class SurvivalAnswer(Result):
         return mode_of_kind(self.kind or "")
 
     @property
-    def _ends_early(self) -> bool:
-        rate, most = self.annual_rate_any, self.annual_rate_any + self.annual_rate_beyond
-        return most > max(NOTABLE_FACTOR * rate, NEVER)
+    def _is_truncated(self) -> bool:
+        """True where the curve leaves open the rate, or P, by more than the factor of a range."""
+        rate, bound = self.annual_rate_any, self.annual_rate_any + self.annual_rate_beyond
+        rate_is_range = bool(is_truncated(np.array(rate), np.array(bound)))
+        # P depends exponentially on the rate: twice the rate may leave a hundredth of P
+        return rate_is_range or self._factor_beyond < 1.0 / NOTABLE_FACTOR
 
     @property
     def _factor_beyond(self) -> float:
-        """Smallest factor on P by shaking above the last level: exp(-rate beyond · mean age).
+        """Smallest factor on P by shaking beyond the levels: exp(-rate beyond · mean age).
 
         P is the mean of exp(-rate · age) over ages. The mean of its product with exp(-rate beyond ·
         age) is at least the product of the means (Chebyshev), and the mean of the latter at least
@@ -173,19 +181,28 @@ class SurvivalAnswer(Result):
         value = percent(self.probability_standing)
         failure = "a failure" if blocks else "failure"
         rate = self.annual_rate_any
-        if self._ends_early:
-            most = return_period(rate + self.annual_rate_beyond)
-            p = self.probability_standing
-            ends = interval(p * self._factor_beyond, p)
-            yield f"{equals(event, ends)}: the hazard curve ends too early"
-            longest = f" and at most {return_period(rate)}" if rate > NEVER else ""
-            yield f"Return period of {failure} at least {most}{longest}"
+        if self._is_truncated:
+            least = self.probability_standing * self._factor_beyond
+            ends = interval(least, self.probability_standing)
+            is_range = least >= SMALLEST or value[0] == "<"
+            p = equals(event, ends) if is_range else f"{event} at most {value}"
+            yield f"{p}: {self.curve_end}"
+            yield f"Return period of {failure} {self._return_period_range()}"
         else:
             ends = interval(self.ci_low, self.ci_high)
             level = f"   ({confidence(self.level, ends)})" if ends != value else ""
             yield f"{equals(event, value)}{level}"
             yield f"Return period of {failure} {return_period(rate)}"
         yield f"{self._curve()} {self._test()}"
+
+    def _return_period_range(self) -> str:
+        """Return the range of the return period, "between 1,600 and 3,200 years"."""
+        rate, bound = self.annual_rate_any, self.annual_rate_any + self.annual_rate_beyond
+        if math.isinf(bound):
+            return f"at most {return_period(rate)}"
+        if rate > NEVER:
+            return f"between {years(bound)} and {return_period(rate)}"
+        return f"at least {return_period(bound)}"
 
     def _curve(self) -> str:
         if len(self.branches) == 1:
@@ -198,21 +215,25 @@ class SurvivalAnswer(Result):
         level = f"at the {exact_percent(REJECTION_LEVEL)} level"
         least = self.ci_low * self._factor_beyond
         if least < REJECTION_LEVEL < self.ci_high:
-            reason = "it ends too early" if self.ci_low >= REJECTION_LEVEL else "the interval of P"
-            includes = "" if self.ci_low >= REJECTION_LEVEL else " includes 5 %"
-            return f"is neither rejected nor accepted {level}: {reason}{includes}{self._factor()}"
+            if self.ci_low >= REJECTION_LEVEL:
+                begins = math.isinf(self.annual_rate_beyond)
+                reason = "it begins too late" if begins else "it ends too early"
+            else:
+                reason = "the interval of P includes 5 %"
+            return f"is neither rejected nor accepted {level}: {reason}{self._factor()}"
         if self.ci_high <= REJECTION_LEVEL and self.factor_5_percent is not None:
             factor = two_digits(self.factor_5_percent)
+            limit = f"at most {factor}" if self._is_truncated else f"{factor} or less"
             return (
-                f"is rejected {level}: consistent only if all its rates are multiplied by {factor} "
-                "or less"
+                f"is rejected {level}: consistent only if all its rates are multiplied by {limit}"
             )
         return f"is not rejected {level}{self._factor()}"
 
     def _factor(self) -> str:
-        if self.factor_5_percent is None or self._ends_early:
+        if self.factor_5_percent is None:
             return ""
-        factor = two_digits(self.factor_5_percent)
+        at_most = "at most " if self._is_truncated else ""
+        factor = f"{at_most}{two_digits(self.factor_5_percent)}"
         return f"; P would be 5 % with all its rates multiplied by {factor}"
 
     def lines(self) -> Iterator[TextLine]:
@@ -226,16 +247,21 @@ class SurvivalAnswer(Result):
             yield TextLine("Model", describe.named_model(vars(self)))
 
     def tables(self, *, verbose: bool = False) -> Iterator[TextTable]:
-        """Yield the factors on the rates with their intervals, bounds, and branches."""
+        """Yield the factors on the rates with their intervals, bounds, and branches.
+
+        Where the curve ends too early they are upper bounds, without intervals.
+        """
         intervals = {
             "probability_standing": (self.ci_low, self.ci_high),
             "factor_5_percent": self.factor_5_percent_ci,
             "factor_50_percent": self.factor_50_percent_ci,
         }
-        rows = [
+        rows: list[dict[str, Any]] = [
             {"": name, "value": getattr(self, name), "ci_low": low, "ci_high": high}
             for name, (low, high) in intervals.items()
         ]
+        if self._is_truncated:
+            rows = [{"": name, "at most": getattr(self, name)} for name in intervals]
         yield TextTable.of_rows(rows, verbose=verbose)
         if self.bounds is not None:
             yield TextTable.of_rows(
@@ -333,6 +359,8 @@ def survival(
     law_index = {
         name: blocks.laws.index(name) for name in (INDEPENDENT, DEPENDENT) if blocks.count > 1
     }
+    used = slice(1) if weight is None else slice(None)
+    beyond, end = _beyond(site_curves[used], rates[used])
     return SurvivalAnswer(
         **_numbers(middle),
         ci_low=least.probability,
@@ -359,8 +387,23 @@ def survival(
         level=answering.get("level", LEVEL),
         warnings=tuple(dict.fromkeys(_warnings(site_curves, rates, blocks))),
         standing=middle,
-        annual_rate_beyond=max(rate.beyond for rate in (rates[:1] if weight is None else rates)),
+        annual_rate_beyond=beyond,
+        curve_end=end,
     )
+
+
+def _beyond(curves: Sequence[HazardCurve], rates: Sequence[AnyRate]) -> tuple[float, str]:
+    """Return the most that shaking beyond the levels of a curve adds to a rate, and the level.
+
+    Args:
+        curves: the curves that the answer is of.
+        rates: rates of any failure under each.
+    """
+    for curve, rate in zip(curves, rates, strict=True):
+        if rate.below > NOTABLE:
+            return math.inf, f"the hazard curve begins at {curve.level_text(0)}"
+    curve, rate = max(zip(curves, rates, strict=True), key=lambda pair: pair[1].beyond)
+    return rate.beyond, f"the hazard curve ends at {curve.level_text(-1)}"
 
 
 def require_kind(inputs: Mapping[str, Any]) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -19,7 +20,7 @@ from rbfrag.hazards.annual_rate import failure_rate
 from rbfrag.hazards.curve import HazardCurve, hazard_curve
 from rbfrag.hazards.curve_file import read_hazard_curves
 from rbfrag.hazards.hazard_rates import hazard
-from rbfrag.hazards.survival import survival
+from rbfrag.hazards.survival import SurvivalAnswer, survival
 from rbfrag.hazards.survival_probability import Age, Standing, weights_given_standing
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2 as G
 from tests.fragility.conftest import model_row
@@ -325,7 +326,9 @@ def test_an_interval_that_includes_5_percent_decides_nothing() -> None:
     answer = survival(curve, fragility=lambda x: np.clip(x, 0.0, 1.0), age_years=300.0)
 
     def test_of(p: float, low: float, high: float) -> str:
-        changed = replace(answer, probability_standing=p, ci_low=low, ci_high=high)
+        changed = replace(
+            answer, probability_standing=p, ci_low=low, ci_high=high, annual_rate_beyond=0.0
+        )
         return [*changed.sentences()][-1]
 
     assert " is rejected at the 5 % level" in test_of(0.02, 0.01, 0.03)
@@ -338,10 +341,41 @@ def test_a_curve_that_ends_early_gives_a_range() -> None:
     answer = survival(curve, fragility=lambda x: np.clip(x - 0.19, 0.0, 1.0), age_years=2000.0)
     assert answer.annual_rate_beyond == pytest.approx(1e-3, rel=0.05)
     first, second, last = answer.sentences()
-    assert first.endswith(" %: the hazard curve ends too early")
-    assert second.startswith("Return period of failure at least 1,0")
-    assert last.endswith("is not rejected at the 5 % level")
+    assert re.search(r" = \d+–\d+ %: the hazard curve ends at PGV = 0.2 m/s$", first)
+    assert second.startswith("Return period of failure between 1,000 and ")
+    assert "is not rejected at the 5 % level; P would be 5 %" in last
     # in 5,000 years at a rate of 1e-3 /yr less than 1 % would stand
     old = survival(curve, fragility=lambda x: np.clip(x - 0.19, 0.0, 1.0), age_years=5000.0)
     *_, last = old.sentences()
-    assert last.endswith("is neither rejected nor accepted at the 5 % level: it ends too early")
+    assert "is neither rejected nor accepted at the 5 % level: it ends too early; P would" in last
+    assert re.search("all its rates multiplied by at most [0-9]+", last)
+
+
+def test_p_is_a_bound_where_a_rate_within_a_factor_of_2_decides_it() -> None:
+    curve = hazard_curve("pgv_m_s", np.array([0.01, 0.1, 0.2]), np.array([1e-2, 2e-3, 1e-3]))
+
+    def answered(end: float, age_years: float) -> SurvivalAnswer:
+        def fragility(x: np.ndarray) -> np.ndarray:
+            return np.where(x < 0.02, 0.0, np.where(x < 0.19, 0.2, end))
+
+        return survival(curve, fragility=fragility, age_years=age_years)
+
+    answer = answered(0.3, 5000.0)
+    assert 0.3 < answer.annual_rate_beyond / answer.annual_rate_any < 1.0
+    first, _, last = answer.sentences()
+    assert re.search(r"years\) at most [\d.]+ %: the hazard curve ends at PGV = 0.2 m/s$", first)
+    assert "multiplied by at most 0." in last
+    (table,) = answer.tables()
+    assert table.headers == ["", "at most"]
+    # so short an age leaves P open by a few percent only
+    first, *_ = answered(0.3, 10.0).sentences()
+    assert first.endswith(" = 99 %")
+
+
+def test_a_curve_that_begins_too_late_gives_a_bound() -> None:
+    curve = hazard_curve("pgv_m_s", np.array([0.1, 1.0, 10.0]), np.array([1e-2, 1e-3, 1e-4]))
+    answer = survival(curve, fragility=lambda x: np.full(x.shape, 0.5), age_years=100.0)
+    first, second, last = answer.sentences()
+    assert re.search(r"years\) at most [\d.]+ %: the hazard curve begins at PGV = 0.1 m/s$", first)
+    assert second.startswith("Return period of failure at most ")
+    assert "it begins too late" in last
