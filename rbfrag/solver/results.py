@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from enum import StrEnum
@@ -12,7 +13,7 @@ from numpy.typing import NDArray
 
 from rbfrag.motions.polarity import POLARITIES as POLARITIES
 from rbfrag.motions.polarity import Polarity as Polarity
-from rbfrag.results.numbers import rounded
+from rbfrag.results.numbers import percent, rounded
 from rbfrag.results.result import Result, TextLine, TextTable
 from rbfrag.solver.kinds import BY_MECHANICS, FOLLOWED, KINDS
 from rbfrag.solver.stability.modes import DrainedYield, ModeName
@@ -312,21 +313,41 @@ class Response(Result):
         return BY_MECHANICS if self.started_s is None and not self.steps else FOLLOWED
 
     def sentences(self) -> Iterator[str]:
-        """Yield the outcome, and the peak rotation and displacement of a block that stays."""
+        """Yield the outcome with the peak rotation, and the displacement of a block that stays."""
         if self.started_s is None and self.outcome is Outcome.STABLE:
             yield "The block does not move: the motion never exceeds its yield acceleration"
             return
-        advice = self.outcome.advice
-        if self.toppled_s is None:
-            yield advice[0].upper() + advice[1:]
+        verb = KINDS[self.kind].verb if self.kind in KINDS else "fails"
+        if self.outcome is Outcome.STABLE and self.peak_theta_rad is not None:
+            yield f"The block does not {verb.removesuffix('s')}: peak rotation {self._peak()}"
+        elif self.outcome is Outcome.STABLE and self.displacement_m is not None:
+            way = "along" if self.displacement_m >= 0.0 else "up"
+            slid = rounded(abs(self.displacement_m))
+            yield f"The block slides {slid} m {way} its base and stops"
+            return
         else:
-            verb = KINDS[self.kind].verb if self.kind in KINDS else "fails"
-            advice = advice.removeprefix("the block is ")
-            yield f"The block {verb} at {self.toppled_s:.2f} s: {advice}"
-        if self.peak_theta_n is not None:
-            yield f"Peak rotation {rounded(self.peak_theta_n)} of the critical angle"
+            advice = self.outcome.advice
+            if self.toppled_s is None:
+                yield advice[0].upper() + advice[1:]
+            else:
+                advice = advice.removeprefix("the block is ")
+                yield f"The block {verb} at {self.toppled_s:.2f} s: {advice}"
+            if self.peak_theta_rad is not None:
+                yield f"Peak rotation {self._peak()}"
         if self.displacement_m is not None:
             yield f"Displacement {rounded(self.displacement_m)} m"
+
+    def _peak(self) -> str:
+        """Return the peak rotation: "0.12° (1.1 % of the critical angle 11.3°)"."""
+        assert self.peak_theta_rad is not None
+        peak_deg, critical_deg = math.degrees(self.peak_theta_rad), self.critical_angle_deg
+        text = f"{peak_deg:.2g}°"
+        if self.peak_theta_n is None or critical_deg is None:
+            return text
+        # the ratio is that of the other corner where a rocking block comes closer to its limit
+        is_of_toe = math.isclose(peak_deg, self.peak_theta_n * critical_deg, rel_tol=1e-6)
+        limit = f"the critical angle {rounded(critical_deg)}°" if is_of_toe else "a critical angle"
+        return f"{text} ({percent(self.peak_theta_n)} of {limit})"
 
     def lines(self) -> Iterator[TextLine]:
         """Yield the model, the time of the motion, the friction of the toe, the drained yield."""
