@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from rbfrag.results.numbers import percent, rounded
 from tests.cli.conftest import Rejects, Shell
 
 SLIDE = ("--s1", "1", "--s2", "2", "--gamma", "60", "--beta", "20", "--phi", "30")
@@ -206,3 +207,18 @@ def test_yields_over_a_rotation_are_dry(rejects: Rejects) -> None:
     Path("wet.toml").write_text(BLOCK_FILE)
     said = rejects("plot", "rotation", "--block", "wet.toml", "--out", "a.png")
     assert "cannot be combined with the yield over a rotation" in said
+
+
+def test_the_headline_says_whether_the_block_fails(shell: Shell, record: Path) -> None:
+    numbers = ("--p2", "3", "--kr", "0.35")
+    answer = shell.json("respond", record, *numbers)
+    assert answer["outcome"] == "stable"
+    headline = shell("respond", record, *numbers).stdout.splitlines()[0]
+    peak_deg = math.degrees(answer["peak_theta_rad"])
+    assert headline == (
+        f"The block does not topple: peak rotation {peak_deg:.2g}° "
+        f"({percent(answer['peak_theta_n'])} of the critical angle 19.3°)"
+    )
+    slid = shell.json("respond", record, *SLIDE)["displacement_m"]
+    headline = shell("respond", record, *SLIDE).stdout.splitlines()[0]
+    assert headline == f"The block slides {rounded(slid)} m along its base and stops"
