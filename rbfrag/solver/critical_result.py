@@ -294,7 +294,7 @@ class CriticalSlide(CriticalResult):
         else:
             yield (
                 f"Critical k_y = {rounded(self.kr)} for a displacement of "
-                f"{self.displacement_m:g} m on a level plane"
+                f"{self.displacement_m:g} m on a level plane; {self._record()}"
             )
         yield "On a dipping base, displacements are cos(φ − β)/cos φ times these"
 
@@ -324,6 +324,7 @@ class SlidingStrengths(Result):
         displacement_m: their displacements on a level plane [m], shape (n,); NaN after a jump.
         warnings: notes on the motion and the search.
         response: of the block that the search was asked for; None for the motion alone.
+        block_ky: k_y of that block; None for the motion alone.
     """
 
     thresholds: tuple[CriticalResult, ...]
@@ -331,6 +332,7 @@ class SlidingStrengths(Result):
     displacement_m: FloatArray
     warnings: tuple[str, ...]
     response: Response | None = None
+    block_ky: float | None = None
 
     def sentences(self) -> Iterator[str]:
         """Yield how far the block slides, and the critical k_y of the first displacement."""
@@ -341,8 +343,9 @@ class SlidingStrengths(Result):
     def _of_block(self, response: Response) -> str:
         """Return which displacement limits the block exceeds."""
         slid = response.displacement_m
+        block = "The block" if self.block_ky is None else f"The block (k_y = {self.block_ky:.3f})"
         if slid is None:
-            return f"The block may slide farther: {response.outcome.advice}"
+            return f"{block} may slide farther: {response.outcome.advice}"
         limits = sorted(strength.as_dict()["displacement_m"] for strength in self.thresholds)
         verdicts = [
             f"{words} {' and '.join(f'{limit:g}' for limit in of)} m"
@@ -352,7 +355,7 @@ class SlidingStrengths(Result):
             )
             if of
         ]
-        return f"The block slides {rounded(slid)} m on its base: {', '.join(verdicts)}"
+        return f"{block} slides {rounded(slid)} m on its base: {', '.join(verdicts)}"
 
     def tables(self, *, verbose: bool = False) -> Iterator[TextTable]:
         """Yield the critical values by displacement, and the displacements by strength."""

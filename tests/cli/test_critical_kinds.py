@@ -60,9 +60,13 @@ def test_sliding_says_how_far_the_block_slides(shell: Shell, record: Path) -> No
     block = ("--height", "2", "--width", "2", "--dip", "20", "--phi", "32")
     slid = shell.json("respond", record, *block)["displacement_m"]
     printed = shell("critical", record, *block, "--displacement", "0.05,0.3").stdout
-    assert printed.startswith(
-        f"The block slides {slid:.3f} m on its base: more than 0.05 m, not more than 0.3 m\n"
+    verdict, critical_ky, *_ = printed.splitlines()
+    # tan(32° - 20°)
+    assert verdict == (
+        f"The block (k_y = 0.213) slides {slid:.3f} m on its base: more than 0.05 m, "
+        "not more than 0.3 m"
     )
+    assert re.search(r"on a level plane; .*PGA [\d.]+ g, forward polarity$", critical_ky)
 
 
 @pytest.mark.parametrize(

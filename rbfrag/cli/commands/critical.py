@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 from rbfrag.cli.output import check_files, print_result, say_when_compiling
 from rbfrag.cli.parameters import options
@@ -79,7 +79,7 @@ def critical(
     rotation, displacement = searched.rotation, searched.displacement
     if searched.kind is not None and (why := facts_of(searched.kind).no_search):
         raise InputError(f"--kind {searched.kind} has no critical value: {why}")
-    block, block_kr, remarks = _searched_block(inputs, searched.kind)
+    block, block_kr, block_ky, remarks = _searched_block(inputs, searched.kind)
     model = _chosen_kind(searched.kind, block, displacement)
     _reject_options_of_other_kinds(
         model,
@@ -103,6 +103,7 @@ def critical(
         )
         with inputs.named():
             slides = _slides(ground, distances, about, kind=model.kind, **block, **shaking)
+            slides = replace(slides, block_ky=block_ky)
         print_result(slides, json=printing.json, verbose=printing.verbose)
         return
     settings: dict[str, Any] = {"rotation_deg": rotation, **block}
@@ -164,10 +165,24 @@ def _reject_options_of_other_kinds(model: KindSpec, used_options: dict[str, bool
         raise InputError("--p2 is missing: the critical strength is computed for one p² [1/s²]")
 
 
-def _searched_block(
-    inputs: ParsedInputs, kind: str | None
-) -> tuple[dict[str, Any], float | None, tuple[str, ...]]:
-    """Return the block of a search by keyword, its k_r if it topples, and warnings."""
+class SearchedBlock(NamedTuple):
+    """Block whose strength a search is compared with.
+
+    Args:
+        question: the block by keyword of the search.
+        kr: its k_r, if it topples; None without a shape.
+        ky: its k_y; None without a shape and friction.
+        warnings: notes on the block.
+    """
+
+    question: dict[str, Any]
+    kr: float | None = None
+    ky: float | None = None
+    warnings: tuple[str, ...] = ()
+
+
+def _searched_block(inputs: ParsedInputs, kind: str | None) -> SearchedBlock:
+    """Return the block of a search."""
     from rbfrag.question.classify import shape_of, without_kv
     from rbfrag.solver.kinds import PLANES, facts_of, kind_of_mode
     from rbfrag.solver.stability.residual_strength import (
@@ -180,7 +195,7 @@ def _searched_block(
     with inputs.named():
         shape = shape_of(without_kv(inputs))
         if shape is None:
-            return {name: inputs[name] for name in ("p2",) if name in inputs}, None, ()
+            return SearchedBlock({name: inputs[name] for name in ("p2",) if name in inputs})
         if "p2" in inputs:
             raise InputError(
                 "p2 cannot be combined with the geometry of a block: give one of them",
@@ -189,7 +204,7 @@ def _searched_block(
     topples = kind_of_mode("topple") if kind is None else facts_of(kind)
     if "phi_deg" not in shape.planes and topples.search_needs == "p2":
         _, numbers, remarks = numbers_of(inputs, topples.kind)
-        return {"p2": numbers["p2"]}, numbers["kr"], remarks
+        return SearchedBlock({"p2": numbers["p2"]}, numbers["kr"], warnings=remarks)
     with inputs.named():
         planes, after = after_first_slip(shape.block, shape.require_friction().planes)
         reject_before_slip(shape.block, planes, kind)
@@ -200,8 +215,8 @@ def _searched_block(
                     fields=(name,),
                 )
     read = {name: value for name, value in planes.items() if name in PLANES or name not in JOINT}
-    kr = stability(shape.block, **read).kr
-    return {"block": shape.block, **read}, kr, after
+    yields = stability(shape.block, **read)
+    return SearchedBlock({"block": shape.block, **read}, yields.kr, yields.ky, after)
 
 
 def _slides(
