@@ -27,19 +27,39 @@ _LONGEST_LABEL = 30
 
 def shaking(uncertain: Mapping[str, Any], inputs: Mapping[str, Any]) -> str:
     """Describe the intensity measures: "PGV 0.9 m/s, PGA 0.6 g"; medians where they have a
-    dispersion.
+    dispersion, over which P is averaged.
+
+    A scenario is described with its mechanism and ground-motion model (``gmm``, by which it is
+    known). The median is that of the model, RotD50, and σ_ln includes the dispersion of a single
+    component about it.
+
+    Args:
+        uncertain: median and dispersion ``sigma`` of each uncertain measure, by name.
+        inputs: measures and the scenario, by the names of :func:`rbfrag.predict`.
     """
     parts = [
         f"{_measure(name)} {inputs[name]:.4g} {QUANTITIES[name].unit}".rstrip()
         for name in (*INTENSITY, "rjb_km", "vs30_m_s")
         if isinstance(inputs.get(name), int | float) and name not in uncertain
     ]
-    parts += [
-        f"median {_measure(name)} {about['median']:.2g} {QUANTITIES[name].unit}, σ_ln "
-        f"{about['sigma']:.2g}, integrated"
+    if not uncertain:
+        return ", ".join(parts)
+    gmm = inputs.get("gmm")
+    of_median, of_sigma = ("", "") if gmm is None else (" (RotD50)", " of a single component")
+    medians = ", ".join(
+        f"median {_measure(name)} {about['median']:.2g} {QUANTITIES[name].unit}{of_median}, σ_ln "
+        f"{about['sigma']:.2g}{of_sigma}"
         for name, about in uncertain.items()
-    ]
-    return ", ".join(parts)
+    )
+    distribution = "this distribution" if len(uncertain) == 1 else "these distributions"
+    mean = f"P is the mean over {distribution}"
+    if gmm is None:
+        return f"{', '.join((*parts, medians))}; {mean}"
+    if mechanism := inputs.get("mechanism"):
+        parts.insert("magnitude" in inputs, mechanism)
+    if "amplification" in inputs:
+        parts.append(f"amplification {inputs['amplification']:g}")
+    return f"{', '.join(parts)} ({gmm}): {medians}; {mean}"
 
 
 def drained_bound(bound: Mapping[str, float | None]) -> str:
@@ -58,12 +78,13 @@ def at_sites(number: float) -> str:
     return f"{number:,g} site{'s' if number > 1 else ''} of one earthquake"
 
 
-def block(method: str, inputs: Mapping[str, Any]) -> str:
+def block(method: str, inputs: Mapping[str, Any], *, support: bool = True) -> str:
     """Describe the parameters and the support of a block: "p² = 7.21 s⁻², k_r = 0.2; rock …".
 
     Args:
         method: the one that the model which answers is fitted by.
         inputs: what the question gives, by the names of :func:`rbfrag.predict`.
+        support: whether the support is described.
     """
     from rbfrag.fragility.methods import method_named
 
@@ -83,7 +104,7 @@ def block(method: str, inputs: Mapping[str, Any]) -> str:
     if isinstance(limit_m, (int, float)):
         numbers.append(f"displacement limit {limit_m:g} m")
     described = ": ".join(filter(None, (_shape(inputs), ", ".join(numbers))))
-    return "; ".join(filter(None, (described, model_block.support)))
+    return "; ".join(filter(None, (described, model_block.support if support else "")))
 
 
 def _shape(inputs: Mapping[str, Any]) -> str:

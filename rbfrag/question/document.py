@@ -61,7 +61,7 @@ def _answer_described(inputs: Mapping[str, Any], *, kind: str | None, **how: Any
     if not blocks.at_rest:
         numbers = {**group.numbers, **measures}
         answer = answer_numbers(numbers, kind=group.kind, remarks=blocks.remarks, **how)
-        return with_values(answer, inputs={**inputs, **numbers})
+        return with_values(answer, inputs={**inputs, **answer.inputs})
     # what is wrong with the shaking is found as for a block that stands
     motion = how.pop("motion", None)
     shaking = measures | ({} if motion is None else {"xp_m_s": 0.0, "pga_g": 0.0})
@@ -118,10 +118,11 @@ def answer_numbers(
         if motion is not None:
             fields = (*SCENARIO, "mechanism", "gmm", "component")
             raise InputError(BESIDE_A_MOTION, fields=fields)
-        from rbfrag.question.scenario import SITE, Source, shaken
+        from rbfrag.question.scenario import SITE, Source, describe_source, shaken
 
         if source[:2] != (None, None) or not question.keys().isdisjoint(SITE):
             is_component_assumed = False
+            inputs = {**inputs, **describe_source(Source(mechanism, gmm))}
         question, further = shaken(question, Source(mechanism, gmm), model, db, component)
         remarks = (*remarks, *further)
     answers: list[Prediction] = []

@@ -56,6 +56,18 @@ class Source(NamedTuple):
     gmm: str | PathLike[str] | None = None
 
 
+def describe_source(source: Source) -> dict[str, str]:
+    """Return the names of the ground-motion model and, if it depends on it, of the mechanism."""
+    if source.gmm is not None:
+        from pathlib import Path
+
+        return {"gmm": Path(source.gmm).name}
+    mechanism = source.mechanism or MECHANISMS[0]
+    if mechanism == MECHANISMS[0]:
+        mechanism = f"mechanism {mechanism}"
+    return {"gmm": "BSSA14", "mechanism": str(mechanism)}
+
+
 def shaken(
     inputs: Mapping[str, Any],
     source: Source,

@@ -8,6 +8,7 @@ import pytest
 
 from rbfrag.fragility import describe
 from rbfrag.fragility.prediction import Prediction
+from rbfrag.question.document import answer_block
 from rbfrag.results.diagnostic import Diagnostic
 from rbfrag.results.numbers import percent, with_interval
 from tests.cli.conftest import Shell
@@ -53,12 +54,27 @@ def test_labelled_lines_say_what_was_asked_and_which_model_answers() -> None:
         answer(0.2, 0.1, 0.3, shaking=about, sites=5, event_low=0.0, event_high=0.1,
                in_domain=False, block_sd=0.12).lines()
     )  # fmt: skip
-    assert found["Shaking"] == "PGA 0.5 g, median PGV 0.17 m/s, σ_ln 0.67, integrated"
+    assert found["Shaking"] == (
+        "PGA 0.5 g, median PGV 0.17 m/s, σ_ln 0.67; P is the mean over this distribution"
+    )
     assert found["Sites"] == (
         "in one earthquake at 5 such sites, 0–10 % of the blocks fail (95 % prediction interval)"
     )
     assert found[""] == "block uncertainty: standard deviation of P 0.12"
     assert found["Model"].endswith("inputs outside the fitted range")
+
+
+def test_a_scenario_is_named_with_its_mechanism_and_ground_motion_model() -> None:
+    inputs = {"height_m": 2.0, "width_m": 0.4, "magnitude": 6.5, "rjb_km": 5.0, "vs30_m_s": 500.0}
+    found = dict(answer_block(inputs, mechanism="reverse").lines())
+    assert found["Shaking"] == (
+        "magnitude 6.5, reverse, R_JB 5 km, Vs30 500 m/s (BSSA14): median PGV 0.34 m/s (RotD50), "
+        "σ_ln 0.67 of a single component; P is the mean over this distribution"
+    )
+    found = dict(answer_block({**inputs, "amplification": 1.5}).lines())
+    assert found["Shaking"].startswith(
+        "magnitude 6.5, mechanism unspecified, R_JB 5 km, Vs30 500 m/s, amplification 1.5 (BSSA14)"
+    )
 
 
 def test_the_block_is_named_with_how_it_is_assumed_to_stand() -> None:
