@@ -148,6 +148,7 @@ class HazardAnswer(Result):
         names: identifiers of the blocks; empty where they have none.
         rejected: rows of the table of blocks that have no answer, by their index: ``block_id``,
             ``site_id`` and ``reason``.
+        block_text: description of the block; empty for several.
     """
 
     annual_rate: FloatArray
@@ -184,6 +185,7 @@ class HazardAnswer(Result):
     drained: FloatArray | None = None
     names: tuple[str | None, ...] = ()
     rejected: Mapping[int, Mapping[str, str]] = field(default_factory=dict)
+    block_text: str = ""
 
     @property
     def modes(self) -> NDArray[np.object_]:
@@ -379,12 +381,14 @@ class HazardAnswer(Result):
         return self.names or (None,) * self.annual_rate.size
 
     def lines(self) -> Iterator[TextLine]:
-        """Yield the hazard curve, the period and the model."""
+        """Yield the hazard curve, the block, the period and the model."""
         curve = self.curves[0]
         place = curve.place if len(self.curves) == 1 else ""
         source = "" if self.branches or len(self.curves) > 1 else Path(curve.source).name
         curve_parts = (curve.imt, source, place, self.curve_kind)
         yield TextLine("Curve", ", ".join(filter(None, curve_parts)))
+        if self.block_text:
+            yield TextLine("Block", self.block_text)
         if self.quantiles and self._is_single:
             low, high = float(self.logic_tree_low[0]), float(self.logic_tree_high[0])
             periods = return_periods(low, high)
@@ -498,6 +502,11 @@ class HazardAnswer(Result):
             )
         ]  # fmt: skip
         return {**rows[0], **shared, "contributions": contributions, "warnings": warnings}
+
+    def table_columns(self) -> Mapping[str, Any]:
+        """Return the columns of the table, one row a block."""
+        columns = super().table_columns()
+        return {name: value for name, value in columns.items() if name != "block_text"}
 
     def _with_rejected(self, rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
         """Return the rows with their reasons, the rejected ones among them."""

@@ -53,7 +53,10 @@ DRAWS = 128
 REJECTION_LEVEL = 0.05
 """Probability of survival below which a hazard curve is rejected."""
 
-_NOT_IN_JSON = ("standing", "annual_rate_beyond", "curve_end")
+_TEXTS = ("curve_end", "block_text")
+"""Texts of the terminal, which are no columns of a table."""
+
+_NOT_IN_JSON = ("standing", "annual_rate_beyond", *_TEXTS)
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,6 +124,7 @@ class SurvivalAnswer(Result):
             rate [1/a]; infinite where a block fails below the first level, since a curve gives no
             rate of weaker shaking.
         curve_end: the level beyond which that is, "the hazard curve ends at PGV = 0.5 m/s".
+        block_text: description of the block; empty for several.
     """
 
     probability_standing: float
@@ -149,6 +153,7 @@ class SurvivalAnswer(Result):
     standing: Standing = field(repr=False)
     annual_rate_beyond: float = 0.0
     curve_end: str = ""
+    block_text: str = ""
 
     @property
     def mode(self) -> str:
@@ -237,8 +242,10 @@ class SurvivalAnswer(Result):
         return f"; P would be 5 % with all its rates multiplied by {factor}"
 
     def lines(self) -> Iterator[TextLine]:
-        """Yield the hazard curve, the dependence of several blocks and the model."""
+        """Yield the hazard curve, the block, the dependence of several and the model."""
         yield TextLine("Curve", ", ".join(filter(None, (self.imt, self.site))))
+        if self.block_text:
+            yield TextLine("Block", self.block_text)
         if self.blocks > 1:
             yield TextLine("Failures", f"joint failures by {self.joint_law}")
         if self.model is None:
@@ -285,6 +292,11 @@ class SurvivalAnswer(Result):
             "site": self.site or None,
             "warnings": list(self.warnings),
         }
+
+    def table_columns(self) -> Mapping[str, Any]:
+        """Return the columns of the table of one row."""
+        columns = super().table_columns()
+        return {name: value for name, value in columns.items() if name not in _TEXTS}
 
 
 def survival(

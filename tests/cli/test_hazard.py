@@ -52,6 +52,21 @@ def test_a_curve_that_ends_too_early_is_no_answer(shell: Shell, curve: Path) -> 
     assert printed.startswith("Return period of failure at least 2,500 years: the hazard curve")
 
 
+def test_a_single_block_is_described_as_in_a_prediction(shell: Shell, curve: Path) -> None:
+    block = ("--p2", "3", "--kr", "0.1")
+
+    def line(*asked: object) -> str:
+        printed = shell(*asked, *block).stdout.splitlines()
+        return next(text for text in printed if text.startswith("Block "))
+
+    described = line("predict", "--pgv", "0.5")
+    assert line("hazard", curve) == described
+    stands = ("--age", "100", "--kind", "toppling")
+    assert described.startswith(f"{line('survival', curve, *stands)}; assumed backed")
+    Path("blocks.csv").write_text("p2_1_s2,kr\n3,0.1\n3,0.2\n")
+    assert "\nBlock " not in shell("hazard", curve, "--blocks", "blocks.csv").stdout
+
+
 def test_shares_are_printed_between_the_levels(shell: Shell, curve: Path) -> None:
     printed = shell("hazard", curve, "--p2", "3", "--kr", "0.1", "--component", "single").stdout
     _, head, rows = printed.partition("PGV [m/s]")

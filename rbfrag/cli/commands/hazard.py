@@ -100,11 +100,13 @@ def hazard(
 
     from rbfrag.exchange.release import RELEASE, SIDES, release_columns
     from rbfrag.exchange.site_rates import blocks_at_sites, numbers_of_dry, rate_columns
+    from rbfrag.fragility import describe
     from rbfrag.fragility.invalid_rows import FROM_SUMS
     from rbfrag.hazards.branches import branch_weights
     from rbfrag.hazards.curve_file import suited_in
     from rbfrag.hazards.hazard_rates import hazard_at_sites
     from rbfrag.hazards.rate_integration import rate_part
+    from rbfrag.question.classify import numbers_in
     from rbfrag.question.question import is_wet, no_drained_bound, without_water
 
     check_files(table=out, plot=plot, excel_text=excel_text)
@@ -157,6 +159,9 @@ def hazard(
         answer, names=tuple(at.names), rejected={} if rows is None else rows.rejected_by_row(),
         warnings=diagnostics(remarks, at.remarks, answer.warnings),
     )  # fmt: skip
+    if rows is None and not is_class:
+        numbers = {name: values[0] for name, values in numbers_in(table).items()}
+        answer = replace(answer, block_text=describe.block(answer.method, {**inputs, **numbers}))
     if out is not None:
         table = rate_columns(answer, at.columns, rows)
         write_table(table, out, excel_text=excel_text, notes=answer.warnings)

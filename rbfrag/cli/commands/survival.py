@@ -64,6 +64,7 @@ def survival(
     """
     import numpy as np
 
+    from rbfrag.fragility import describe
     from rbfrag.hazards.curve_file import as_curves
     from rbfrag.hazards.standing_blocks import ALL_STAND
     from rbfrag.hazards.survival import KIND_MISSING, require_kind
@@ -87,6 +88,11 @@ def survival(
         draws=uncertainty.draws, seed=uncertainty.seed, **numbers, **vars(meaning), **answering,
     )  # fmt: skip
     answer = replace(answer, warnings=(*remarks, *answer.warnings))
+    if rows is None:
+        values = {name: column[0] for name, column in numbers.items()}
+        # how the block is assumed to stand is among the notes
+        text = describe.block(str(answer.method), {**inputs, **values}, support=False)
+        answer = replace(answer, block_text=text)
     if plot is not None:
         from rbfrag.plots.survival import plot_survival
 
