@@ -85,7 +85,7 @@ class RbfragError(Exception):
 
     Args:
         message: what is wrong; fields stand in it under their keywords.
-        fields: those of them that a door may spell in its own way.
+        fields: those of them that each interface (CLI, HTTP, Python) prints in its own spelling.
     """
 
     exit_status: ClassVar[int] = 2

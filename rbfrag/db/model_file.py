@@ -31,8 +31,8 @@ class ModelRow:
 
     Args:
         name: unique name.
-        term: intensity term (``pgv``, ``pga_tm``, ``pgd_tm``).
-        method: fit method (``wls``).
+        term: set of intensity measures, a name of `rbfrag.fragility.measures.TERMS`.
+        method: a name of `rbfrag.fragility.methods`.
         coefficients: value of each parameter by name, in a fixed order.
         covariance: covariance of the parameters in that order.
         domain: fitted range (low, high) of each variable by name.
@@ -233,7 +233,10 @@ def held_out_loss(row: ModelRow, *names: str) -> float:
 
 
 def answers_special_questions(row: ModelRow) -> bool:
-    """Return whether a model is for special cases only: a record, or one rotation."""
+    """Return whether a model uses the record's own spectrum X(p) or is of one rotation limit.
+
+    Such a model answers first where its inputs are given, and is never a default.
+    """
     return row.term == "xp" or row.diagnostics.get("rotation_deg") is not None
 
 

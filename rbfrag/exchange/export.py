@@ -202,7 +202,7 @@ class _Request(NamedTuple):
         shares: shares of them [%] that are limit states of all, or None.
         component: horizontal component of the measure.
         how: number of levels, model and database.
-        remarks: what is to be said of the blocks.
+        remarks: warnings about the blocks.
     """
 
     facts: KindSpec

@@ -30,7 +30,7 @@ class SitedBlocks:
         sites: curves of each site at which a block stands, one from each file.
         columns: ``block_id``, ``kind`` and numbers of the blocks.
         site: index of the site of each block, shape (m,).
-        remarks: what is to be said.
+        remarks: warnings about the blocks.
         missing: by index of the rows given, the reasons of those of sites that have no curve.
     """
 

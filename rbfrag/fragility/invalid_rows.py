@@ -121,7 +121,7 @@ def reject_elements(
     Args:
         reasons: of each element, empty where it can be used, shape (m,).
         why: why the others do not do.
-        fields: fields that a door spells in the reason of a single one.
+        fields: fields in the reason that each interface prints in its own spelling.
     """
     wrong = elements(reasons)
     if reasons.size == 1 and wrong:

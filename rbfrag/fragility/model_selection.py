@@ -76,8 +76,8 @@ class _Store:
 
 
 _SHIPPED = str(REFERENCE)
-_stores_before: dict[tuple[str, bool], _Store] = {}
-_rows_before: dict[int, tuple[ModelRow, FragilityModel]] = {}
+_store_cache: dict[tuple[str, bool], _Store] = {}
+_model_cache: dict[int, tuple[ModelRow, FragilityModel]] = {}
 _MOST_ROWS = 64
 
 
@@ -244,6 +244,9 @@ def _suited_in(
     # those that are kept for comparison answer where there is no other, or where one was chosen
     usual = {term: m for term, m in best.items() if m.form.rank == 0 or m.row.is_default}
     best = usual or best
+    # The best model comes first: one of the record's own spectrum or of the given rotation, then
+    # the chosen default, the lowest log loss on earthquakes held out, the most predictors
+    # (docs/theory/fragility.md, "Which model answers").
     return sorted(
         best.values(),
         key=lambda m: (
@@ -335,13 +338,13 @@ def _measures(names: Collection[str]) -> str:
 
 
 def _of_row(row: ModelRow) -> FragilityModel:
-    cached = _rows_before.get(id(row))
+    cached = _model_cache.get(id(row))
     if cached is not None and cached[0] is row:
         return cached[1]
     model = FragilityModel.from_row(row)
-    if len(_rows_before) >= _MOST_ROWS:
-        _rows_before.clear()
-    _rows_before[id(row)] = (row, model)
+    if len(_model_cache) >= _MOST_ROWS:
+        _model_cache.clear()
+    _model_cache[id(row)] = (row, model)
     return model
 
 
@@ -410,7 +413,7 @@ def _in_memory(db: str | PathLike[str] | None) -> _Store | None:
 
 
 def _unchanged(path: str, shipped: bool) -> _Store | None:
-    cached = _stores_before.get((path, shipped))
+    cached = _store_cache.get((path, shipped))
     return cached if cached is not None and cached.stamp == _stamp(path, shipped) else None
 
 
@@ -421,7 +424,7 @@ def _read_again(path: Path, shipped: bool) -> _Store:
     stamp = _stamp(key, shipped)
     store = _Store(SHIPPED if shipped else key, stamp, read_models(path))
     if stamp:
-        _stores_before[key, shipped] = store
+        _store_cache[key, shipped] = store
     return store
 
 

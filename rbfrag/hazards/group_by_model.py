@@ -41,7 +41,7 @@ def parts_by_model(
     """Return the blocks grouped by model.
 
     Returns:
-        The parts, what is to be said of the blocks, and of each why it cannot be used, empty for
+        The parts, warnings about the blocks, and of each why it cannot be used, empty for
         those that can.
 
     Raises:

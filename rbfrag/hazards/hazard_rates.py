@@ -79,7 +79,7 @@ def hazard(
 ) -> HazardAnswer:
     """Return the annual rates of failure of blocks under a seismic hazard curve.
 
-    λ_f = ∫ P(fails | x) (-dλ), by P on the nodes of a grid against the curve's mass there
+    λ_f = ∫ P(fails | im) (-dν), ν the hazard curve, as a sum over the nodes of a grid
     (:mod:`rbfrag.hazards.rate_integration`). The interval is that of the model's parameters, by the
     delta method on ln λ_f. The model is one of the curve's own measure: what else shaking of that
     level may be is scatter in its P. What a block may be, by its standard deviations, is
@@ -200,13 +200,13 @@ def hazard_at_sites(
     checked_years(years)
     reading = HazardLevel.of(first[0], **meaning)
     by_law = reading.magnitudes_from_g is not None
-    alone = (im_uncertainty.PGA_ALONE,) if reading.name == "pga_g" else ()
-    if alone and answering.get("model") is None:
+    pga_alone = (im_uncertainty.PGA_ALONE,) if reading.name == "pga_g" else ()
+    if pga_alone and answering.get("model") is None:
         named = [row.name for row in stored_rows(answering.get("db")) if row.term == "pga"]
         by_model = f", or accept the bias with model {named[0]}" if named else ""
         raise InputError(
-            f"{first[0].source}: {alone[0].partition(':')[0]}; give a curve of PGV or SA(1.0), or "
-            f"the disaggregation by magnitude{by_model}",
+            f"{first[0].source}: {pga_alone[0].partition(':')[0]}; give a curve of PGV or SA(1.0), "
+            f"or the disaggregation by magnitude{by_model}",
             fields=("model", "disaggregation"),
         )
     parts, remarks, reason = parts_by_model(inputs, reading, answering)
@@ -258,7 +258,7 @@ def hazard_at_sites(
             int((~sound).sum()), sound.size, elements(reason), reason[~sound].tolist(),
             FROM_MEAN if one_class else FROM_SUMS,
         ),
-        *notes, *alone,
+        *notes, *pga_alone,
         *_of_curves(sites), *(note for part in parts for note in part.model.notes),
         *describe_ends(first, where, result.rate, *ends[:2], result.ends[0]),
         *_describe_numbers(result), *of_joints,
@@ -305,7 +305,7 @@ def hazard_at_sites(
         quantiles=quantiles,
         total_low=float(interval_end(np.array(total_rate), total, -1.0)),
         total_high=float(interval_end(np.array(total_rate), total, 1.0)),
-        warnings=counted(texts),
+        warnings=merge_similar_warnings(texts),
         reason=np.full(1, "", dtype=object) if one_class else reason,
         kinds=np.array([_listed(kinds)], dtype=object) if one_class else kinds,
         count=number,
@@ -479,7 +479,7 @@ def _describe_numbers(result: Rates) -> Iterator[str]:
 _NUMBER = re.compile(r"[+-]?\d[\d.,]*(?:e[+-]?\d+)?")
 
 
-def counted(texts: Iterable[str]) -> tuple[str, ...]:
+def merge_similar_warnings(texts: Iterable[str]) -> tuple[str, ...]:
     """Return the warnings grouped: texts that differ only in their numbers are counted together.
 
     What is said of each of thousands of sites is said once, with the first as an example.

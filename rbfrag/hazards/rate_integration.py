@@ -29,11 +29,11 @@ _EDGE_EVERY = 10
 
 _BLOCKS_OF_A_PART = 4096
 _FARTHEST = 50.0
-"""Logarithm of the factor beyond which an end of an interval says nothing."""
+"""Logarithm of the factor beyond which an end of an interval is meaningless."""
 
 _HALVINGS = 48
 _EVERY = 8
-"""Nodes of which one tells whether they are in the ranges that a model was fitted on."""
+"""The fitted range is checked at every so many nodes of the grid."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -246,10 +246,10 @@ class Rates(NamedTuple):
 
     Args:
         rate: annual rate of failure of each [1/a].
-        half: what the interval of its rate reaches to on either side, Student's quantile times
-            the standard error [1/a], by the delta method.
+        half: half-width of the confidence interval of the rate [1/a]: Student's quantile times
+            the standard error, by the delta method.
         gradient: derivatives of the rate by the model's parameters, k x m.
-        error: how far the grid may be off [1/a].
+        error: bound on the error of the grid [1/a].
         outside: part of the rate from outside the ranges that the model was fitted on [1/a].
         branches: rate in each branch [1/a], branches x m.
         ends: P at the first and the last level of the curve and at its end, 3 x m.

@@ -129,7 +129,7 @@ class ModelBlocks:
         weight: weights of the draws, which sum to 1, shape (k,).
         medians: the same of the medians, shape (m,) each.
         shaking: what the curve's levels are to the model.
-        remarks: what is to be said of the blocks.
+        remarks: warnings about the blocks.
     """
 
     numbers: Mapping[str, FloatArray]

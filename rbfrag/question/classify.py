@@ -109,7 +109,7 @@ class Blocks(NamedTuple):
 
     Args:
         groups: those that a model may answer for.
-        remarks: what is to be said of all of them.
+        remarks: warnings about all of them.
         rejected: those that cannot be used.
         unstable: those that fall at rest.
         kinds: kind of each, a place in ``KINDS``, -1 for none; None where all are of one group.

@@ -147,7 +147,7 @@ def answer_numbers(
                 else [find_model(model, question, db, **options)]
             )
         except InputError as error:
-            # here the measures are fields of the question, which each door spells
+            # fields of the question, which each interface prints in its own spelling
             error.fields = error.fields or INTENSITY
             raise
         for suited_model in models:

@@ -1,7 +1,7 @@
 """Validation of block geometries, and the model inputs computed from them.
 
-One code for a single shape and for many: a :class:`Listener` raises the first reason of a single
-one, and keeps each's own of many. No numpy is loaded for a single shape.
+One code for a single shape and for arrays: an :class:`IssueCollector` raises the first reason of a
+single shape, and keeps the reason of every element of an array. No numpy is loaded for a single shape.
 """
 
 from __future__ import annotations
@@ -148,7 +148,7 @@ class IssueCollector(Protocol):
         Args:
             holds: whether, or which.
             text: the reason, with the names of values in braces.
-            fields: fields in it that a door may spell in its own way.
+            fields: fields that each interface prints in its own spelling.
             values: the values, numbers or arrays.
         """
 

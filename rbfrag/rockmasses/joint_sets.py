@@ -128,7 +128,7 @@ class RockMass:
         back_fracture: False for blocks that no plane supports from behind.
         realisations: number of blocks that the description asks for.
         seed: seed of the random numbers that the description asks for.
-        remarks: what is to be said of its planes in space, and of a density that is assumed.
+        remarks: warnings about its planes in space, and about an assumed density.
         drainage: what the water in the back fractures does while blocks move, `UNDRAINED` or
             `DRAINED` of :mod:`rbfrag.solver.stability.joint`.
     """

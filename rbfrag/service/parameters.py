@@ -2,7 +2,7 @@
 
 A parameter has the name of the command line's option without its dashes, and the same unit;
 spectral accelerations are named as the columns of tables are. Values are read here as numbers and
-texts; which of them can be used, the packages below say, in the same words to every door.
+texts; the packages below decide which can be used, with the same texts for every interface.
 """
 
 from __future__ import annotations

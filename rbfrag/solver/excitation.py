@@ -72,8 +72,8 @@ class Excitation:
     @cached_property
     def jump_node(self) -> int:
         """First node at which 1 + k_v <= 0 (the ground falls away); n where there is none."""
-        lost = np.flatnonzero(self.w <= 0.0)
-        return int(lost[0]) if lost.size else int(self.w.size)
+        unloaded = np.flatnonzero(self.w <= 0.0)
+        return int(unloaded[0]) if unloaded.size else int(self.w.size)
 
     @cached_property
     def q(self) -> FloatArray:

@@ -13,7 +13,7 @@ import pytest
 import rbfrag
 from rbfrag.db.engine import opened_database
 from rbfrag.db.models import save_model
-from rbfrag.hazards.hazard_rates import counted
+from rbfrag.hazards.hazard_rates import merge_similar_warnings
 from rbfrag.results.numbers import annual_rate, place, return_period
 from tests.block_tables import read_columns
 from tests.cli.conftest import Rejects, Shell
@@ -399,7 +399,7 @@ def test_a_standing_rock_is_uncertain_in_its_restitution_too(shell: Shell) -> No
 
 def test_warnings_are_counted_by_kind() -> None:
     texts = ["curve 1: coarse", "of all", "curve 2: coarse", "of all", "curve 10: coarse"]
-    assert counted(texts) == ("curve 1: coarse (and 2 more of the kind)", "of all")
+    assert merge_similar_warnings(texts) == ("curve 1: coarse (and 2 more of the kind)", "of all")
 
 
 def test_several_blocks_without_a_site_are_rejected(rejects: Rejects, logic_tree: Path) -> None:

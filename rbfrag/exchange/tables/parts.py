@@ -123,7 +123,7 @@ class TableFile:
     Args:
         names: what its columns are called; empty for one without a name.
         read: returns its parts, by the columns that hold numbers.
-        remarks: what is to be said of it; all of it when its parts have been read.
+        remarks: warnings about the table; complete when its parts have been read.
         word: what its rows are counted by: line, row or feature.
         dialect: how to write CSV that is like it.
         sheets: the sheets of a workbook of which none was named.

@@ -353,7 +353,7 @@ def mesh_block(
         up: the axis that points up.
         contact_mm: height above the lowest vertex up to which vertices are contacts [mm].
         density_kg_m3: density [kg/m³]; only the mass needs it.
-        warnings: what is to be said of the mesh before.
+        warnings: those of the mesh.
 
     Raises:
         InputError: a value outside its range; or the centre of mass does not lie above the

@@ -19,11 +19,11 @@ from rbfrag.solver.results import FloatArray
 REFINEMENTS = 8
 """Steps of Newton for a landing; two are nearly always enough."""
 
-LEFT_BY_NEWTON = 1e-17
-"""Error of a landing that is no longer corrected, over the time to it."""
+NEWTON_TOLERANCE = 1e-17
+"""Relative error of a landing time at which Newton's method stops."""
 
 
-class Inside(NamedTuple):
+class StepEvents(NamedTuple):
     """Events within one step.
 
     Args:
@@ -120,6 +120,7 @@ def irrecoverable(rate: float, s: float, c: float, least_q: float, error: float)
         least_q: minimum of q = k_h/(1 + k_v) from here on, at most 0 (rest after the record).
         error: bound on |error of theta| + |error of theta'/p|.
     """
+    # s < 0 is asked for itself: for c < 0 the last condition can hold with s > 0.
     # q > tan(psi) multiplied by c, which also holds at a quarter turn (c = 0). An error of psi
     # changes c q - s by at most error (|q| + 1), hence the bound on the right
     return (rate > error) & (s < 0.0) & (c * least_q - s > error * (1.0 - least_q))
@@ -151,7 +152,7 @@ def left_at_turn(border: float, rate: float) -> float:
 @inner_kernel
 def examine_step(
     theta: float, u: FloatArray, order: int, theta_end: float, u_end: float, v_end: float
-) -> Inside:
+) -> StepEvents:
     """Find the events within one step.
 
     The step is cut at the turning points of theta into monotone stretches, so a peak and an
@@ -197,13 +198,13 @@ def examine_step(
             # a stretch that begins at 0 and falls is an impact at its beginning
             if theta_left > 0.0:
                 tau_left = bracketed_root(OF_ROTATION, theta, u, order, tau_left, tau_right)
-            return Inside(tau_left, peak, peak_at, lowest)
+            return StepEvents(tau_left, peak, peak_at, lowest)
         elif not at_end:
             lowest = min(lowest, theta_right)
         rising = not rising
         tau_left = tau_right
         theta_left = theta_right
-    return Inside(-1.0, peak, peak_at, lowest)
+    return StepEvents(-1.0, peak, peak_at, lowest)
 
 
 @fused_kernel
@@ -250,7 +251,7 @@ def landing(theta: float, u: FloatArray, order: int) -> tuple[float, float]:
         if not 0.0 < tau < 2.0:
             break
         # a step of Newton leaves step² theta''/(2 theta') of the error
-        if bend * (step * step) <= LEFT_BY_NEWTON * tau * -rate:
+        if bend * (step * step) <= NEWTON_TOLERANCE * tau * -rate:
             return min(tau, 1.0), rate + slope * step
     return -1.0, 0.0
 

@@ -28,9 +28,9 @@ from rbfrag.solver.integrator.state import (
     Place,
     State,
     StepExcitation,
+    append_history,
     excitation_over,
     higher,
-    noted,
     time_of_jump,
 )
 from rbfrag.solver.integrator.step import state_after, take_step
@@ -201,7 +201,7 @@ def cross_interval(
             peak = higher(peak, inside.peak, abs(off.theta))
             if keeps and inside.peak > 0.0:
                 top_s = nodes.time_s[i] + (at + part * inside.peak_at) * nodes.interval_s[i]
-                filled = noted(rows, filled, top_s, side * inside.peak, 0.0, EVENT)
+                filled = append_history(rows, filled, top_s, side * inside.peak, 0.0, EVENT)
             if inside.impact >= 0.0:
                 impact_at = at + part * inside.impact
                 state = State(0.0, inside.rate / ph, corner.sin, corner.cos)
@@ -291,8 +291,8 @@ def noted_impact(
     rows: FloatArray, filled: int, time_s: float, rate: float, rate_after: float
 ) -> int:
     """Append an impact to a history: the rates before and after it."""
-    filled = noted(rows, filled, time_s, 0.0, rate, EVENT)
-    return noted(rows, filled, time_s, 0.0, rate_after, IMPACT)
+    filled = append_history(rows, filled, time_s, 0.0, rate, EVENT)
+    return append_history(rows, filled, time_s, 0.0, rate_after, IMPACT)
 
 
 class RockingEnd(NamedTuple):
@@ -388,14 +388,14 @@ def run_rocking(
             now_s = time_s[i] + tau * interval_s[i]
             if math.isnan(started_s):
                 started_s = now_s
-            filled = noted(rows, filled, now_s, 0.0, 0.0, EVENT)
+            filled = append_history(rows, filled, now_s, 0.0, 0.0, EVENT)
         if interval_s[i] * (1.0 - tau) <= 0.0:
             # nothing moves in no time: of a jump, or a start at the very end, what follows decides
             side = 0 if state.theta == 0.0 and state.rate == 0.0 else side
             i, tau, lifting = i + 1, 0.0, False
             if side != 0:
                 rate = side * state.rate * corner.p
-                filled = noted(rows, filled, time_s[i], side * state.theta, rate, i)
+                filled = append_history(rows, filled, time_s[i], side * state.theta, rate, i)
             continue
         # an impact and a new start in one interval count it once
         if i != counted:
@@ -432,11 +432,13 @@ def run_rocking(
             continue
         state, off = arc.state, arc.off
         i, tau = i + 1, 0.0
-        filled = noted(rows, filled, time_s[i], side * state.theta, side * state.rate * corner.p, i)
+        filled = append_history(
+            rows, filled, time_s[i], side * state.theta, side * state.rate * corner.p, i
+        )
         # past all recovery, whatever the rest of the record does; a history shows the fall too
         least_q = nodes.tail_min_q[i] if side > 0 else -tail_max_q[i]
-        lost = irrecoverable(state.rate, state.sin, state.cos, least_q, 0.0)
-        if math.isnan(decided_s) and (lost or arc.fallen):
+        is_irrecoverable = irrecoverable(state.rate, state.sin, state.cos, least_q, 0.0)
+        if math.isnan(decided_s) and (is_irrecoverable or arc.fallen):
             decided_s = time_s[i]
         if arc.fallen:
             break

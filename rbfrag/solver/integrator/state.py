@@ -166,7 +166,9 @@ def higher(peak: Peak, x: float, error: float) -> Peak:
 
 
 @within
-def noted(history: FloatArray, filled: int, time_s: float, x: float, rate: float, node: int) -> int:
+def append_history(
+    history: FloatArray, filled: int, time_s: float, x: float, rate: float, node: int
+) -> int:
     """Append one column to a history that is not full; return the number of filled columns."""
     # a run that keeps no history has one without columns: no second kernel is compiled for it
     if filled >= history.shape[1]:

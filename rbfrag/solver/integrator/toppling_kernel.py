@@ -30,10 +30,10 @@ from rbfrag.solver.integrator.state import (
     Peak,
     Place,
     State,
+    append_history,
     excitation_over,
     higher,
     kernel_corner,
-    noted,
     time_of_jump,
 )
 from rbfrag.solver.integrator.step import (
@@ -88,11 +88,11 @@ class Progress(NamedTuple):
         state: of the block.
         bounds: of the trajectory so far.
         started_s: first motion [s], NaN for none.
-        lost: whether an impact may as well have been a fall: the error hid the difference.
+        is_hidden: True after an impact within the error bound: what follows it is unknown.
         steps: integration steps so far.
         samples: sample intervals in which the block moved.
         decided_s: when toppling was certain [s], NaN as long as it is not.
-        decided_error: `known.error` then.
+        decided_error: `bounds.error` at that time.
         filled: columns of the history that are filled.
     """
 
@@ -101,7 +101,7 @@ class Progress(NamedTuple):
     state: State
     bounds: TrajectoryBounds
     started_s: float
-    lost: bool
+    is_hidden: bool
     steps: int
     samples: int
     decided_s: float
@@ -150,7 +150,7 @@ class ArcEnd(NamedTuple):
         impact_at: fraction of the interval at which the block closes its contact, or -1; `state`
             then holds the rate of the impact.
         verdict_at: fraction at the end of the first step past which it has toppled, or -1.
-        verdict_error: `known.error` there.
+        verdict_error: `bounds.error` at that time.
         steps: integration steps taken.
         filled: columns of the history that are filled.
     """
@@ -225,7 +225,7 @@ def cross_interval(
             peak = higher(peak, inside.peak, error)
             if keeps and inside.peak > 0.0:
                 top_s = nodes.time_s[i] + (at + part * inside.peak_at) * nodes.interval_s[i]
-                filled = noted(rows, filled, top_s, inside.peak, 0.0, EVENT)
+                filled = append_history(rows, filled, top_s, inside.peak, 0.0, EVENT)
             # no rebound: theta' of the impact is lost, and matters for the error estimate only
             if inside.impact >= 0.0:
                 impact_at = at + part * inside.impact
@@ -315,7 +315,7 @@ def end_of_run(nodes: Nodes, corner: Corner, progress: Progress) -> Run:
         if nodes.last < nodes.k_h.size - 1:
             outcome = JUMP
             decided_s = time_of_jump(nodes.time_s, nodes.interval_s, nodes.w, nodes.last)
-        elif progress.lost:  # the block may be another one since an impact that the error hid
+        elif progress.is_hidden:  # a graze within the error bound: two trajectories may follow it
             outcome = UNDETERMINED
         elif progress.moving:
             outcome, peak, error = after_record(progress.state, bounds, corner.theta_c)
@@ -356,7 +356,8 @@ def advance(
     level = Thresholds(1.0, corner.kr, 0.0, 0.0, False)
     keeps = rows.shape[1] > 0
     (
-        i, moving, state, bounds, started_s, lost, steps, samples, decided_s, decided_error, filled
+        i, moving, state, bounds, started_s, is_hidden, steps, samples, decided_s, decided_error,
+        filled,
     ) = progress  # fmt: skip
     tau = 0.0  # position inside interval i
     counted = -1  # interval counted last
@@ -380,7 +381,7 @@ def advance(
             if math.isnan(started_s):
                 started_s = lifted_s
             if not at_once:  # what closes its contact and opens it again has one entry
-                filled = noted(rows, filled, lifted_s, 0.0, 0.0, EVENT)
+                filled = append_history(rows, filled, lifted_s, 0.0, 0.0, EVENT)
         if interval_s[i] * (1.0 - tau) <= 0.0:
             # a jump, or a start at the very end of the interval: what follows decides
             moving = state.theta != 0.0 or state.rate != 0.0
@@ -405,16 +406,20 @@ def advance(
                 threshold = nodes.k_h[i] - nodes.w[i] * corner.kr
                 threshold += (nodes.k_h[i + 1] - nodes.w[i + 1] * corner.kr - threshold) * tau
                 bounds, hidden = errors_after_impact(bounds, state.rate, threshold, corner)
-                lost = lost or hidden
-                filled = noted(rows, filled, time_s[i] + tau * interval_s[i], 0.0, 0.0, EVENT)
+                is_hidden = is_hidden or hidden
+                filled = append_history(
+                    rows, filled, time_s[i] + tau * interval_s[i], 0.0, 0.0, EVENT
+                )
                 moving = lifting = False
                 if tau >= 1.0:
                     i, tau = i + 1, 0.0
                 continue
         lifting = False
         i, tau = i + 1, 0.0
-        filled = noted(rows, filled, time_s[i], state.theta, state.rate * corner.p, i)
-        # a history shows the fall as far as the block lies on its face
+        filled = append_history(rows, filled, time_s[i], state.theta, state.rate * corner.p, i)
+        # Toppling is certain from the node on where `irrecoverable` holds (sin < 0, past balance,
+        # is the cheap half of the test). tail_min_q[i] is the minimum from this node on, rest after
+        # the record included. A history shows the fall until the block lies on its face
         if not math.isnan(decided_s):
             if state.theta > corner.theta_c + 0.5 * math.pi:
                 break
@@ -425,7 +430,8 @@ def advance(
             decided_error = bounds.error
 
     return Progress(
-        i, moving, state, bounds, started_s, lost, steps, samples, decided_s, decided_error, filled
+        i, moving, state, bounds, started_s, is_hidden, steps, samples, decided_s, decided_error,
+        filled,
     )  # fmt: skip
 
 

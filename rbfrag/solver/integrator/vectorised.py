@@ -45,7 +45,7 @@ from rbfrag.solver.results import FloatArray, IntArray
 BATCH = 32
 
 FEW = 3
-"""Number of runs that no longer pay for a vector step."""
+"""At or below this number of runs, steps of single runs are faster than a vector step."""
 
 # Where the slots' values begin in one array: of what a step takes ...
 PH, SIN, COS, K_H, DK_H, W, DW, THETA, RATE, ERROR, DRIFT, PEAK, LEAST_Q, APART = (
@@ -64,7 +64,7 @@ SLOT = np.dtype(
         ("job", "i8"), ("number", "i8"), ("parts", "i8"), ("part", "f8"), ("length_s", "f8"),
         ("node", "i8"), ("theta", "f8"), ("rate", "f8"), ("sin", "f8"), ("cos", "f8"),
         ("error", "f8"), ("drift", "f8"), ("peak", "f8"), ("peak_error", "f8"),
-        ("started_s", "f8"), ("lost", "i8"), ("steps", "i8"), ("samples", "i8"),
+        ("started_s", "f8"), ("is_hidden", "i8"), ("steps", "i8"), ("samples", "i8"),
     ]
 )  # fmt: skip
 """Which run is in a slot, which part of its interval comes next, how many parts there are, their
@@ -141,7 +141,7 @@ def enter(progress: Progress, place: Any, x: FloatArray, slot: int) -> None:
     """Place a run, at a node, into a slot."""
     place.number = 0
     place.length_s = -1.0
-    place.node, place.lost = progress.node, progress.lost
+    place.node, place.is_hidden = progress.node, progress.is_hidden
     place.peak, place.peak_error = progress.bounds.peak
     place.started_s, place.steps, place.samples = (
         progress.started_s, progress.steps, progress.samples
@@ -174,7 +174,7 @@ def put_down_progress(place: Any) -> Progress:
         state,
         bounds,
         place.started_s,
-        place.lost > 0,
+        place.is_hidden > 0,
         place.steps,
         place.samples,
         math.nan,

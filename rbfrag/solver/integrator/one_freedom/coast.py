@@ -26,7 +26,7 @@ from rbfrag.solver.integrator.one_freedom.step import (
     harmonic_sum,
     uniform_terms,
 )
-from rbfrag.solver.integrator.state import Peak, higher, noted
+from rbfrag.solver.integrator.state import Peak, append_history, higher
 from rbfrag.solver.results import FloatArray
 
 NEAR_STANDSTILL = 1e-9
@@ -135,7 +135,7 @@ def coast(
         peak = higher(peak, x, error_x)
         node += 1
         now_s = time_s[node]
-        filled = noted(history, filled, now_s, x, rate, node)
+        filled = append_history(history, filled, now_s, x, rate, node)
         least_q = tail_min_q[node]
         certain_s = certain_since(
             certain_s, now_s, rate, forward_driving, forward_resistance, least_q

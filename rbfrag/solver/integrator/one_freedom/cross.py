@@ -29,7 +29,7 @@ from rbfrag.solver.integrator.one_freedom.step import (
     error_growth,
     fill_step,
 )
-from rbfrag.solver.integrator.state import EVENT, Line, Peak, higher, noted
+from rbfrag.solver.integrator.state import EVENT, Line, Peak, append_history, higher
 from rbfrag.solver.integrator.taylor import rotation, value
 from rbfrag.solver.results import FloatArray
 
@@ -145,7 +145,7 @@ def cross_interval(
         if arrival.turn_tau >= 0.0:
             peak = higher(peak, arrival.turn_x, state.error_x)
             turned_s = line.start_s + (at + size * arrival.turn_tau) * line.h
-            filled = noted(history, filled, turned_s, arrival.turn_x, 0.0, EVENT)
+            filled = append_history(history, filled, turned_s, arrival.turn_x, 0.0, EVENT)
         state = arrival.state
         peak = higher(peak, state.x, state.error_x)
         tau = at + size * arrival.tau

@@ -47,7 +47,15 @@ from rbfrag.solver.integrator.one_freedom.step import (
     local_frequency,
 )
 from rbfrag.solver.integrator.rest import Thresholds, depart
-from rbfrag.solver.integrator.state import EVENT, Line, Peak, Place, line_at, noted, time_of_jump
+from rbfrag.solver.integrator.state import (
+    EVENT,
+    Line,
+    Peak,
+    Place,
+    append_history,
+    line_at,
+    time_of_jump,
+)
 from rbfrag.solver.results import FloatArray
 
 GOES_ON = -1
@@ -113,7 +121,7 @@ def run_phase(
             if stop != GOES_ON:
                 break
             moving, barred = True, 0
-            filled = noted(history, filled, now_s, state.x, 0.0, EVENT)
+            filled = append_history(history, filled, now_s, state.x, 0.0, EVENT)
         elif jumps_after(record, node):
             stop = JUMPED
             break
@@ -147,7 +155,7 @@ def run_phase(
         if line.h * (1.0 - tau) <= 0.0:  # a jump of the record, or a start at an interval's end
             moving = not rules.sticks or state.rate != 0.0
             if moving:
-                filled = noted(history, filled, line.start_s, state.x, state.rate, node)
+                filled = append_history(history, filled, line.start_s, state.x, state.rate, node)
             node, tau, jumped = node + 1, 0.0, True
             continue
         if not past_record and node != counted:
@@ -171,7 +179,7 @@ def run_phase(
             impacts += 1 if crossing.kind == IMPACT else 0
             moving, barred = not rules.sticks, state.sense
             stopped_s, certain_s = line.start_s + tau * line.h, math.nan
-            filled = noted(history, filled, stopped_s, state.x, 0.0, EVENT)
+            filled = append_history(history, filled, stopped_s, state.x, 0.0, EVENT)
             # what is left of an interval of the record goes on from the same place
             if past_record:
                 free_s, tau = free_s + tau * line.h, 0.0
@@ -184,7 +192,9 @@ def run_phase(
         else:
             node += 1
         now_s = record.time_s[node] + free_s
-        filled = noted(history, filled, now_s, state.x, state.rate, EVENT if past_record else node)
+        filled = append_history(
+            history, filled, now_s, state.x, state.rate, EVENT if past_record else node
+        )
         certain_s = certain_at(record, rules, state, node, past_record, now_s, certain_s)
 
     stop_s, end = ended(record, stop, line, Place(node, tau), free_s, state)
