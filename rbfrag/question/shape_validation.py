@@ -1,7 +1,7 @@
 """Validation of block geometries, and the model inputs computed from them.
 
 One code for a single shape and for arrays: an :class:`IssueCollector` raises the first reason of a
-single shape, and keeps the reason of every element of an array. No numpy is loaded for a single shape.
+single shape, and keeps the reason of every element of an array. A single shape loads no numpy.
 """
 
 from __future__ import annotations
