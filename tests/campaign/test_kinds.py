@@ -303,7 +303,7 @@ def test_models_are_fitted_stored_and_asked(tmp_path: Path) -> None:
                 assert row.is_default == (term == "pgv_pga")
         with engine.connect() as connection:
             checks = check_models(connection, model_rows(connection))
-        assert [each.state for each in checks] == ["unchanged"] * 3
+        assert [row["state"] for row in checks.rows()] == ["unchanged"] * 3
     slid = predict(ky=0.05, displacement_m=0.02, pgv_m_s=0.5, pga_g=0.4, db=place)
     assert slid.model == "sliding-pgv_pga"
     assert 0.0 < slid.probability <= 1.0

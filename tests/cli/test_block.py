@@ -115,11 +115,11 @@ def test_table_for_people(shell: Shell) -> None:
         ((*ANGLES, "--polygon", "b.toml", *PLANES), "cannot be combined with --polygon"),
         ((*ANGLES, "--phi", "35"), "--beta is missing"),
         ((*ANGLES, "--beta", "5"), "--phi is missing"),
-        ((*ANGLES, "--beta", "5", "--phi", "90"), "--phi = 90"),
+        ((*ANGLES, "--beta", "5", "--phi", "90"), "--phi must be at least 0° and below 90°, not 90"),
         ((*ANGLES, "--beta", "nan", "--phi", "35"), "--beta = nan"),
         ((*ANGLES, *PLANES, "--kv", "-1"), "kv = -1"),
         (("--alpha1", "25", "--alpha3", "-10", "--r3", "1", *PLANES), "not below"),
-        (("--s1", "0", "--s2", "1", "--gamma", "60", *PLANES), "--s1 = 0"),
+        (("--s1", "0", "--s2", "1", "--gamma", "60", *PLANES), "--s1 must be above 0 m, not 0"),
         (("--polygon", "nowhere.csv", *PLANES), "nowhere.csv: no such file"),
     ],
 )

@@ -74,7 +74,7 @@ def test_help_and_version_load_no_command() -> None:
 def test_a_typing_error_is_answered_with_a_suggestion() -> None:
     result = CliRunner().invoke(app, ["prdict"])
     assert result.exit_code == 2
-    assert "Did you mean 'predict'?" in result.stderr
+    assert "did you mean predict?" in result.stderr
 
 
 @dataclass(frozen=True, kw_only=True)
