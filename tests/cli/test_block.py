@@ -115,7 +115,7 @@ def test_table_for_people(shell: Shell) -> None:
         ((*ANGLES, "--polygon", "b.toml", *PLANES), "cannot be combined with --polygon"),
         ((*ANGLES, "--phi", "35"), "--beta is missing"),
         ((*ANGLES, "--beta", "5"), "--phi is missing"),
-        ((*ANGLES, "--beta", "5", "--phi", "90"), "--phi must be at least 0° and below 90°, not 90"),
+        ((*ANGLES, "--beta", "5", "--phi", "90"), "--phi must be at least 0° and below 90°"),
         ((*ANGLES, "--beta", "nan", "--phi", "35"), "--beta = nan"),
         ((*ANGLES, *PLANES, "--kv", "-1"), "kv = -1"),
         (("--alpha1", "25", "--alpha3", "-10", "--r3", "1", *PLANES), "not below"),
