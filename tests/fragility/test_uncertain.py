@@ -196,9 +196,9 @@ def test_draws_are_answered_by_their_weighted_mean() -> None:
 def test_extrapolation_is_said_where_part_of_the_block_is_outside() -> None:
     answer = predict(28.0, 0.1, pgv_m_s=0.6, p2_sigma=0.3)
     assert answer.in_domain
-    assert any("uncertain block may be lies outside" in text for text in answer.warnings)
+    assert any("block uncertainty, comes from outside" in text for text in answer.warnings)
     many = predict(np.array([28.0, 3.0]), 0.1, pgv_m_s=0.6, p2_sigma=0.3)
-    assert "uncertain block" in many.reason[0]
+    assert "block uncertainty" in many.reason[0]
     assert many.reason[1] == ""
 
 
