@@ -180,7 +180,7 @@ def test_options_are_spelled_by_the_command_line_alone() -> None:
 
 
 AVOIDED = re.compile(
-    r"\b(of 100 such|tells?|telling|told|stated|rejects?|rejected|besides?|share|scatters?|"
+    r"\b(of 100 such|tells?|telling|told|stated|refuses?|refused|besides?|share|scatters?|"
     r"(?<!there )(is|are) no(ne)?|too far|like blocks|anew|at hand|made[- ]up|shaken|nought|"
     r"what the block may|greatest|goes? with|go together|says?|said|speed after an impact|lobes?|"
     r"left out|leave .{1,40} out|is taken|knows|counting error|brings down|comes loose|rungs?)\b",

@@ -169,11 +169,11 @@ def vertical_pairs(without: CombinationTable, with_vertical: CombinationTable) -
     vertical = combinations(with_vertical)
     pairs = vertical.merge(combinations(without), on=keys, suffixes=("_with", ""))
     first, second = pairs["row"].to_numpy(), pairs["row_with"].to_numpy()
-    found_without, found_with = (
+    first_has_value, second_has_value = (
         without.status[first] == "found",
         with_vertical.status[second] == "found",
     )
-    both = found_without & found_with
+    both = first_has_value & second_has_value
     a = without.kr_over_pga[first[both]]
     b = with_vertical.kr_over_pga[second[both]]
     return VerticalPairs(
@@ -182,7 +182,7 @@ def vertical_pairs(without: CombinationTable, with_vertical: CombinationTable) -
         with_vertical=b,
         p2=without.p2[first[both]],
         event_id=without.event_id[first[both]],
-        one_sided=int(np.sum(found_without != found_with)),
+        one_sided=int(np.sum(first_has_value != second_has_value)),
     )
 
 

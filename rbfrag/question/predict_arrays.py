@@ -217,10 +217,10 @@ def _together(
     size = int(np.prod(shape))
     columns: dict[str, Any] = {}
     for name in _COLUMNS:
-        pieces = [(at, value) for at, part in parts if (value := getattr(part, name)) is not None]
-        if pieces or name != "block_sd":
+        chunks = [(at, value) for at, part in parts if (value := getattr(part, name)) is not None]
+        if chunks or name != "block_sd":
             columns[name] = column = np.full(size, np.nan)
-            for at, value in pieces:
+            for at, value in chunks:
                 column[at] = value
     in_domain = np.zeros(size, dtype=np.bool_)
     reasons: list[ReasonPart] = []

@@ -74,7 +74,7 @@ def _unit(file: RecordFile, header: range) -> HeaderField | None:
             continue
         if other := _OTHER.search(line):
             raise _no_acceleration(file, other[0], at + 1)
-        words = [bracketed or plain for bracketed, plain in _UNIT.findall(line)]
+        words = [bracketed or bare for bracketed, bare in _UNIT.findall(line)]
         fields += [HeaderField(word, at + 1) for word in words if word not in {"", "s", "sec"}]
     for field in fields:
         try:

@@ -108,8 +108,8 @@ def _block(fields: dict[str, Any]) -> Block:
             f"{', '.join(sorted(accepted))}, {', '.join(CONDITIONS)}"
         )
     forms = " or ".join(", ".join(names) for names in (ANGLES, FRACTURES, POLYGON))
-    keys_found = ", ".join(sorted(keys)) or "none of them"
-    raise InputError(f"a block is given by exactly one of {forms}; the file has {keys_found}")
+    key_list = ", ".join(sorted(keys)) or "none of them"
+    raise InputError(f"a block is given by exactly one of {forms}; the file has {key_list}")
 
 
 def _from_csv(source: Path, text: str) -> dict[str, Any]:
