@@ -107,7 +107,7 @@ def test_places_that_cannot_be_written(tmp_path: Path, name: str) -> None:
         ("a.csv", b"kr\n\xff\n", "not a text file"),
         ("a.csv", b"PK\x03\x04\x14\0", "is a zip file: unpack it"),
         ("a.parquet", b"kr\n0.1\n", "not a Parquet file"),
-        ("a.txt", b"kr\n0.1\n", "use .csv, .xlsx or .parquet"),
+        ("a.txt", b"kr\n0.1\n", "use .csv, .xlsx, .parquet or .ods"),
     ],
 )
 def test_tables_that_cannot_be_read(tmp_path: Path, name: str, content: bytes, words: str) -> None:

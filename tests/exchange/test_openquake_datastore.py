@@ -19,7 +19,7 @@ pytest.importorskip("h5py", reason="the extra hdf5 is not installed")
 
 
 def same(one: EventSet, other: EventSet) -> bool:
-    names = ("event_id", "realization", "year", "event", "site", "places")
+    names = ("event_id", "realization", "year", "event", "site", "coordinates")
     assert one.site_ids == other.site_ids
     assert one.duration == other.duration
     assert one.warnings == other.warnings
