@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     from rbfrag.results.result import Result
 
-_FIELDS = tuple(name for name in QUESTION if "_" in name)
+OPTION_FIELDS = tuple(name for name in QUESTION if "_" in name)
 """Inputs that notes name as Python does; a name without a unit is an everyday word."""
 
 
@@ -88,7 +88,7 @@ def _cut(text: str, size: int) -> str:
 
 
 def print_result(
-    result: Result, *, json: bool, verbose: bool = False, fields: Collection[str] = _FIELDS
+    result: Result, *, json: bool, verbose: bool = False, fields: Collection[str] = OPTION_FIELDS
 ) -> None:
     """Print an answer: headline, labelled lines, notes, tables.
 

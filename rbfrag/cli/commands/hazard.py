@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Annotated, cast
 
 from rbfrag.cli.commands.simulate import WorkerOptions
-from rbfrag.cli.output import check_files, print_result, write_table
+from rbfrag.cli.output import OPTION_FIELDS, check_files, print_result, write_table
 from rbfrag.cli.parameters import options
 from rbfrag.cli.parameters.block import BlocksOptions
 from rbfrag.cli.parameters.option_groups import ParsedInputs, argument, fields_of, option, stacked
@@ -172,4 +172,5 @@ def hazard(
         from rbfrag.plots.hazard import plot_contribution
 
         plot_contribution(at.sites[0][0], answer, plot)
-    print_result(answer, json=printing.json, verbose=printing.verbose, fields=())
+    fields = OPTION_FIELDS if rows is None else ()  # notes on a table name its columns
+    print_result(answer, json=printing.json, verbose=printing.verbose, fields=fields)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Annotated
 
-from rbfrag.cli.output import check_files, print_result
+from rbfrag.cli.output import OPTION_FIELDS, check_files, print_result
 from rbfrag.cli.parameters import options
 from rbfrag.cli.parameters.block import TableOptions
 from rbfrag.cli.parameters.option_groups import ParsedInputs, argument, fields_of, option, stacked
@@ -97,4 +97,5 @@ def survival(
         from rbfrag.plots.survival import plot_survival
 
         plot_survival(read, answer, plot)
-    print_result(answer, json=printing.json, verbose=printing.verbose, fields=())
+    fields = OPTION_FIELDS if rows is None else ()  # notes on a table name its columns
+    print_result(answer, json=printing.json, verbose=printing.verbose, fields=fields)
