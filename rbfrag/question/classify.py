@@ -37,7 +37,7 @@ from rbfrag.question.shape_validation import (
 )
 from rbfrag.results.diagnostic import Diagnostic
 from rbfrag.solver.block.geometry import Block
-from rbfrag.solver.kinds import KINDS, KindSpec, facts_of, kind_of_mode
+from rbfrag.solver.kinds import FREE_STANDING, KINDS, KindSpec, facts_of, kind_of_mode
 from rbfrag.solver.quantity import number
 from rbfrag.solver.stability.joint import ROCK_KG_M3, is_drained
 from rbfrag.vocabulary.quantities import (
@@ -175,7 +175,8 @@ def _listed_numbers(value: Any) -> list[float]:
 
 
 FREE_NEEDS_NONE = (
-    "; for a free-standing rectangular block no friction angle is required with kind='rocking'"
+    "; for a free-standing rectangular block no friction angle is required with "
+    f"kind={FREE_STANDING!r}"
 )
 
 
