@@ -476,6 +476,9 @@ def _bounds_of_z(
     The component's scatter is that of the event at the site. A single block's own parameters are
     those of its sample in every event; those of like blocks are drawn by what they are given Z.
     """
+    # A block fails where Z <= Φ⁻¹(P), with P given the component's deviation xi at the site and the
+    # block's own size and strength. Single blocks draw both; identical blocks keep the scores on a
+    # grid of strengths, from which their number of failures is drawn.
     portfolio, indices = part.portfolio, shaken.block
     strengths = np.linspace(-_REACH, _REACH, _STRENGTHS)
     sizes, weight = normal_steps(_SIZES, _REACH)
