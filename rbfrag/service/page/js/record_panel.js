@@ -111,7 +111,8 @@ export function recordPanel(tell) {
     const asked = { ...readingNow(), p2, kr };
     /** @type {(answers: any[]) => void} */
     const showVerdict = (answers) => {
-      if (of.spectrum !== spectrum || of.block !== block) return;
+      // the same block may have been placed again meanwhile, with other shaking
+      if (of.spectrum !== spectrum || block?.p2 !== p2 || block.kr !== kr) return;
       spectrum.verdict = { p2, kr, texts: answers.map(spoken) };
       compare();
       tell.changed();
