@@ -94,12 +94,12 @@ METHOD = '''
 """The method of pads: logistic in ln(x/y) and in the thickness."""
 
 from rbfrag.fragility import fits, method
-from rbfrag.fragility.method import BlockParameters, Eta, Form, Method
+from rbfrag.fragility.method import BlockParameters, Form, LinearPredictor, Method
 
 
 def _eta(b, v, ns):
     ratio = ns.log(v["intensity_m_s"] / v["y_m_s"])
-    return Eta(b[0] + b[1] * ratio + b[2] * v["pad_m"], (1.0, ratio, v["pad_m"]))
+    return LinearPredictor(b[0] + b[1] * ratio + b[2] * v["pad_m"], (1.0, ratio, v["pad_m"]))
 
 
 METHOD = Method(
