@@ -179,7 +179,7 @@ def remaining_work(connection: Connection, plan: CampaignPlan, extra: ExtraResul
     """Return the part of a plan that is not stored yet.
 
     Args:
-        extra: what it asks for beside critical values and outcome grids.
+        extra: what it asks for in addition to critical values and outcome grids.
     """
     combinations = known_combinations(connection, (case.natural_key for case in plan.cases))
     with_blocks = (

@@ -274,7 +274,7 @@ class _Request(NamedTuple):
             of = "Mean over" if self.shares is None else "Shares of"
             return [f"{of} {size} stable {mean}."]
         stands = (
-            "that stands free"
+            "that is free-standing"
             if is_free_standing
             else "backed by a slope"
             if topples

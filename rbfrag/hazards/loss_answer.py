@@ -141,8 +141,8 @@ class LossAnswer(Result):
         warnings: what to know about the answer.
         rejected: unusable rows of the table, by their index: ``block_id``, ``site_id`` and
             ``reason``.
-        tau: standard deviation of ln rate between measures, beside all intervals; None where it is
-            not known.
+        tau: standard deviation of ln rate between measures, in no interval; None where it is
+            unknown.
     """
 
     events: EventSet

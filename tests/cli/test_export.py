@@ -73,7 +73,7 @@ def test_functions_of_free_standing_blocks(shell: Shell, rejects: Callable[..., 
         ).probability
         assert np.abs(found.at(x) - expected).max() < 1.2 * told["largest_relative_error"] + 1e-5
     assert "Overturning of free-standing rock blocks" in Path("a.xml").read_text()
-    assert "that stands free" in json.loads(Path("a.json").read_text())["block"]["Description"]
+    assert "that is free-standing" in json.loads(Path("a.json").read_text())["block"]["Description"]
     backed = ("export", "nrml", "--p2", "3", "--kr", "0.1", "--out", "b.xml")
     message = rejects(*backed, "--restitution", "0.8", "--kind", "toppling")
     assert "--restitution cannot be combined with kind toppling" in message

@@ -36,7 +36,7 @@ def fit_lognormal(
     """Fit ln y* = a + b ln x (+ (M-1) ln p) with lognormal dispersion sigma.
 
     Combinations without a critical value above the search limit count as "below the limit".
-    Covariance is clustered by earthquake; a bootstrap by earthquake is reported beside it.
+    Covariance is clustered by earthquake; a bootstrap by earthquake is reported, too.
 
     Raises:
         FitError: the median does not rise with intensity, or there is no scatter.

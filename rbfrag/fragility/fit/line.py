@@ -252,7 +252,7 @@ def fit_wls(data: FitData, method: Method, term: Term, *, seed: int) -> MethodRe
     """Fit y* = c0 + c1 x with variance v(x), the method of the dissertation.
 
     Censored points are left out of the fit (and bias it upwards). The covariance is that of the
-    fits that each leave an earthquake out; a bootstrap by earthquake is reported beside it.
+    fits that each leave an earthquake out; a bootstrap by earthquake is reported, too.
 
     Args:
         term: the intensity term, which sets the degree of v(x).
