@@ -43,7 +43,7 @@ SHAKING = (
     "--motion RECORD --polarity both", "--pgd 50 --tm .01", "--pgv -1",
     "--pgv .6 --pga .01 --arias 200 --magnitude 2 --pgd 30",
 )  # fmt: skip
-OTHERS = (
+OTHER_QUESTIONS = (
     "block --height 2 --width .4 --dip 10 --phi 35", "block --p2 3 --kr .1",
     "block --s1 1 --s2 .6 --gamma 25 --beta 20 --phi 40 --kv .1", "block --height -1 --width .4",
     "respond RECORD --p2 3 --kr .1", "respond RECORD --height 2 --width .4 --kind rocking",
@@ -108,19 +108,19 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def command_lines() -> Iterator[str]:
     for block, measures in itertools.product(BLOCKS, SHAKING):
         yield f"predict {block} {measures} --json"
-    yield from (f"{line} --json" for line in OTHERS)
-    yield from (f"{line}" for line in OTHERS)
+    yield from (f"{line} --json" for line in OTHER_QUESTIONS)
+    yield from (f"{line}" for line in OTHER_QUESTIONS)
 
 
 def answers(checkout: Path, lines: Sequence[Sequence[str]]) -> dict[str, str]:
     """Return what a checkout prints, by command line."""
     environment = {**os.environ, "PYTHONPATH": str(checkout), "COLUMNS": "100"}
     environment.pop("RBFRAG_DB", None)
-    done = subprocess.run(
-        [sys.executable, __file__], input=json.dumps(lines), cwd=checkout, env=environment,
+    process = subprocess.run(
+        [sys.executable, "-P", __file__], input=json.dumps(lines), cwd=checkout, env=environment,
         check=True, stdout=subprocess.PIPE, text=True,
     )  # fmt: skip
-    return dict(json.loads(done.stdout))
+    return dict(json.loads(process.stdout))
 
 
 def run(lines: Sequence[Sequence[str]]) -> dict[str, str]:
@@ -135,7 +135,7 @@ def run(lines: Sequence[Sequence[str]]) -> dict[str, str]:
     pages = [[name, "--help"] for name in COMMANDS]
     for name in COMMANDS:
         below = getattr(root.get_command(None, name), "commands", {})
-        pages += [[name, each, "--help"] for each in below]
+        pages += [[name, command, "--help"] for command in below]
     for words in (*lines, *pages):
         with contextlib.chdir(Path.cwd()):
             result = CliRunner().invoke(app, words)

@@ -67,8 +67,8 @@ def _records(root: Path) -> Iterator[Any]:
         except rbfrag.RbfragError:
             continue  # manifests and read-mes lie beside the records
         for motion in motions:
-            usable = motion.is_vertical is not True and motion.npts > 1
-            if usable and motion.acceleration_g.any() and motion.sha256 not in seen:
+            is_usable = motion.is_vertical is not True and motion.npts > 1
+            if is_usable and motion.acceleration_g.any() and motion.sha256 not in seen:
                 seen.add(motion.sha256)
                 yield motion
 
@@ -112,7 +112,7 @@ def _runs(motions: Sequence[Any]) -> dict[str, dict[str, Any]]:
             for name, request in requests.items():
                 try:
                     result = rbfrag.respond(motion, polarity=polarity, **request)
-                    values = {each: getattr(result, each, None) for each in KEPT_OF_RUNS}
+                    values = {name: getattr(result, name, None) for name in KEPT_OF_RUNS}
                     values = {**values, "outcome": str(result.outcome)}
                 except rbfrag.RbfragError as error:
                     values = {"outcome": f"rejected: {error}"}
@@ -136,39 +136,39 @@ def _compare(then: dict[str, Any], now: dict[str, Any]) -> None:
     for certified in (True, False):
         _compare_brackets(then["brackets"], now["brackets"], certified)
     pairs = [
-        (tuple(one), tuple(other))
+        (tuple(older), tuple(other))
         for key, rows in then["outcomes"].items()
-        for one, other in zip(rows, now["outcomes"][key], strict=True)
+        for older, other in zip(rows, now["outcomes"][key], strict=True)
     ]
-    outcomes = sum(one[0] == other[0] for one, other in pairs)
-    peaks = sum(one[1] == other[1] for one, other in pairs)
+    outcomes = sum(older[0] == other[0] for older, other in pairs)
+    peaks = sum(older[1] == other[1] for older, other in pairs)
     print(f"{len(pairs)} blocks of grids: outcome equal in {outcomes}, peak bit for bit in {peaks}")
     kinds: dict[str, list[tuple[str, dict[str, Any], dict[str, Any]]]] = {}
-    for key, one in then["runs"].items():
-        kinds.setdefault(key.split(":")[0].split(" ")[0], []).append((key, one, now["runs"][key]))
+    for key, older in then["runs"].items():
+        kinds.setdefault(key.split(":")[0].split(" ")[0], []).append((key, older, now["runs"][key]))
     for kind, runs in kinds.items():
         differs = [run for run in runs if run[1] != run[2]]
         print(f"{len(runs)} runs, {kind.rstrip(',')}: {len(runs) - len(differs)} bit for bit equal")
-        for key, one, other in differs:
+        for key, older, other in differs:
             changed = (
-                f"{name} {one.get(name)} -> {other.get(name)}"
+                f"{name} {older.get(name)} -> {other.get(name)}"
                 for name in KEPT_OF_RUNS
-                if one.get(name) != other.get(name)
+                if older.get(name) != other.get(name)
             )
             print(f"  {key}: {', '.join(changed)}")
 
 
 def _compare_brackets(then: dict[str, Any], now: dict[str, Any], certified: bool) -> None:
     """Compare the answers whose certificate was given, or was not, by the older version."""
-    keys = [key for key, one in then.items() if one["certified"] is certified]
+    keys = [key for key, older in then.items() if older["certified"] is certified]
     greatest = dict.fromkeys(BRACKET[2:], 0.0)
     for key in keys:
         for name in greatest:
-            one, other = then[key][name], now[key][name]
-            if (one is None) != (other is None):
+            older, other = then[key][name], now[key][name]
+            if (older is None) != (other is None):
                 greatest[name] = math.inf
-            elif one is not None:
-                greatest[name] = max(greatest[name], abs(one - other) / abs(one))
+            elif older is not None:
+                greatest[name] = max(greatest[name], abs(older - other) / abs(older))
     same = sum(all(then[key][n] == now[key][n] for n in BRACKET[:2]) for key in keys)
     differences = ", ".join(f"{name} {value:.3g}" for name, value in greatest.items())
     print(

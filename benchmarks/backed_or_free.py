@@ -35,8 +35,7 @@ from rbfrag.plots.canvas import (
 )
 from rbfrag.solver import toppling_run
 from rbfrag.solver.excitation import Excitation, excitation
-from rbfrag.solver.integrator.free_rocking import TOPPLED
-from rbfrag.solver.integrator.rocking_kernel import RockingRun
+from rbfrag.solver.integrator.rocking_kernel import TOPPLED, RockingRun
 from rbfrag.solver.models.rocking import free_block
 from rbfrag.solver.respond import block_of_numbers
 from rbfrag.solver.results import DEFAULT_P2, POLARITIES
@@ -66,13 +65,13 @@ class Shares:
     """What overturns.
 
     Args:
-        free: 1 where a free block does, shape (motions, p², y/PGV).
+        free_standing: 1 where a free block does, shape (motions, p², y/PGV).
         backed: mean of both polarities, shape (motions, p², y/PGV).
         predicted: P of the backed block by the shipped model, shape (motions, p², y/PGV).
         below_pga: where k_r is below PGA, shape (motions, p², y/PGV).
     """
 
-    free: FloatArray
+    free_standing: FloatArray
     backed: FloatArray
     predicted: FloatArray
     below_pga: NDArray[np.bool_]
@@ -80,7 +79,12 @@ class Shares:
     def where_thought_safe(self) -> FloatArray:
         """Return the share of free blocks below PGA where P of a backed one is small, by p²."""
         safe = self.below_pga & (self.predicted < RARE)
-        return np.array([self.free[:, i][safe[:, i]].mean() for i in range(self.free.shape[1])])
+        return np.array(
+            [
+                self.free_standing[:, i][safe[:, i]].mean()
+                for i in range(self.free_standing.shape[1])
+            ]
+        )
 
 
 def shares(
@@ -93,24 +97,24 @@ def shares(
     pgv = np.array([motion.pgv_m_s for motion in motions])[:, None, None]
     sizes = np.asarray(p2)[:, None]
     kr = pgv * np.asarray(y_over_pgv) * np.sqrt(sizes) / STANDARD_GRAVITY_M_S2
-    free, backed = np.empty(kr.shape), np.empty(kr.shape)
+    free_standing, backed = np.empty(kr.shape), np.empty(kr.shape)
     for m, motion in enumerate(motions):
         ways = [excitation(motion, None, polarity) for polarity in POLARITIES]
         for i, size in enumerate(p2):
             for j, strength in enumerate(kr[m, i].tolist()):
                 # an even block on level ground needs one polarity
-                free[m, i, j] = rocks(ways[0], size, strength).outcome == TOPPLED
+                free_standing[m, i, j] = rocks(ways[0], size, strength).outcome == TOPPLED
                 backed[m, i, j] = np.mean(
                     [
                         toppling_run.simulate(way, p2=size, kr=strength).outcome == TOPPLED
                         for way in ways
                     ]
                 )
-    given = np.broadcast_arrays(sizes, kr, pgv, pga)
+    inputs = np.broadcast_arrays(sizes, kr, pgv, pga)
     names = ("p2", "kr", "pgv_m_s", "pga_g")
-    flat = {name: values.ravel() for name, values in zip(names, given, strict=True)}
+    flat = {name: values.ravel() for name, values in zip(names, inputs, strict=True)}
     predicted = rbfrag.predict(**flat).probability.reshape(kr.shape)
-    return Shares(free, backed, predicted, kr < pga)
+    return Shares(free_standing, backed, predicted, kr < pga)
 
 
 def rocks(excited: Excitation, p2: float, kr: float) -> RockingRun:
@@ -128,15 +132,15 @@ def stored_motions(folder: Path) -> list[GroundMotion]:
             return [load_motion(connection, row.id) for row in rows]
 
 
-def table(found: Shares) -> str:
+def table(fractions: Shares) -> str:
     """Return free | backed shares by p² and strength."""
     headers = ["p² [1/s²]", *(f"{Y_OVER_PGV[j]:.2f}" for j in SHOWN), "where P < 5 %"]
-    free, backed = found.free.mean(axis=0), found.backed.mean(axis=0)
-    safe = found.where_thought_safe()
+    free_standing, backed = fractions.free_standing.mean(axis=0), fractions.backed.mean(axis=0)
+    safe = fractions.where_thought_safe()
     cells = [
         [
             f"{size:g}",
-            *(f"{_short(free[i, j])} / {_short(backed[i, j])}" for j in SHOWN),
+            *(f"{_short(free_standing[i, j])} / {_short(backed[i, j])}" for j in SHOWN),
             _short(safe[i]),
         ]
         for i, size in enumerate(DEFAULT_P2)
@@ -164,7 +168,7 @@ class Scan:
     def of(cls, motion: GroundMotion) -> Scan:
         """Run the blocks."""
         excited, kr = excitation(motion), SCANNED * motion.pga_g
-        runs = [rocks(excited, SCANNED_P2, each) for each in kr.tolist()]
+        runs = [rocks(excited, SCANNED_P2, strength) for strength in kr.tolist()]
         peak = np.array([max(run.forward.x, run.backward.x) for run in runs]) / np.arctan(kr)
         return cls(np.array([run.outcome == TOPPLED for run in runs]), peak)
 
@@ -174,20 +178,22 @@ class Scan:
         return int(np.sum(self.falls & ~np.append(False, self.falls[:-1])))
 
 
-def draw(found: Shares, scan: Scan) -> None:
+def draw(fractions: Shares, scan: Scan) -> None:
     """Draw the shares over the strength, and the scan."""
     figure = new_figure(9.4, 4.2)
-    left, right = figure.subplots(1, 2)
+    left_axes, right = figure.subplots(1, 2)
     for i, size in enumerate(DEFAULT_P2):
         colour = colormaps["viridis"](0.95 * i / (len(DEFAULT_P2) - 1))
-        left.plot(Y_OVER_PGV, found.free[:, i].mean(axis=0), color=colour, label=f"{size:g}")
-        left.plot(Y_OVER_PGV, found.backed[:, i].mean(axis=0), "--", color=colour, lw=1.0)
-    left.plot([], [], "--", color="black", lw=1.0, label="backed")
-    left.set_xscale("log")
-    written_numbers(left.xaxis, 1.0, 2.0, 5.0)
-    left.set_xlabel(r"$y/\mathrm{PGV}$")
-    left.set_ylabel("share that overturns")
-    left.legend(title="p² [1/s²], free-standing", fontsize=8, title_fontsize=8, frameon=False)
+        left_axes.plot(
+            Y_OVER_PGV, fractions.free_standing[:, i].mean(axis=0), color=colour, label=f"{size:g}"
+        )
+        left_axes.plot(Y_OVER_PGV, fractions.backed[:, i].mean(axis=0), "--", color=colour, lw=1.0)
+    left_axes.plot([], [], "--", color="black", lw=1.0, label="backed")
+    left_axes.set_xscale("log")
+    written_numbers(left_axes.xaxis, 1.0, 2.0, 5.0)
+    left_axes.set_xlabel(r"$y/\mathrm{PGV}$")
+    left_axes.set_ylabel("share that overturns")
+    left_axes.legend(title="p² [1/s²], free-standing", fontsize=8, title_fontsize=8, frameon=False)
     for falls in (False, True):
         right.fill_between(
             SCANNED, 0.0, 1.0, where=scan.falls == falls, step="mid", lw=0.0, rasterized=True,
@@ -200,18 +206,18 @@ def draw(found: Shares, scan: Scan) -> None:
     right.set_xlim(SCANNED[0], SCANNED[-1])
     right.set_ylim(0.0, 1.0)
     right.legend(loc="upper right", fontsize=8)
-    for axes in (left, right):
+    for axes in (left_axes, right):
         open_corner(axes)
-    light_grid(left)
+    light_grid(left_axes)
     save_figure(figure, FIGURE)
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
     chosen = parser(__doc__).parse_args(arguments)
     motions = stored_motions(Path(chosen.records or os.environ[RECORDS_VARIABLE]))
-    found = shares(motions)
-    text = f"{table(found)}\n\n{len(motions)} horizontal motions, free / backed."
-    scanned = [each for each in motions if each.source_file == SCANNED_RECORD]
+    fractions = shares(motions)
+    text = f"{table(fractions)}\n\n{len(motions)} horizontal motions, free / backed."
+    scanned = [motion for motion in motions if motion.source_file == SCANNED_RECORD]
     if scanned:
         scan = Scan.of(scanned[0])
         text += (
@@ -219,7 +225,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
             f"{SCANNED[0]:g} to {SCANNED[-1]:g} PGA: {scan.islands} separate islands overturn."
         )
         if chosen.write:
-            draw(found, scan)
+            draw(fractions, scan)
     report("backed-or-free", text, write=chosen.write, page=PAGE)
 
 

@@ -34,17 +34,17 @@ def arcs_of(geometry: dict[str, Any]) -> Iterator[int]:
         yield from arcs_of(part)
     stack = list(geometry.get("arcs", ()))
     while stack:
-        one = stack.pop()
-        if isinstance(one, list):
-            stack += one
+        span = stack.pop()
+        if isinstance(span, list):
+            stack += span
         else:
-            yield ~one if one < 0 else one
+            yield ~span if span < 0 else span
 
 
 def simplified(points: np.ndarray, tolerance: float) -> np.ndarray:
     """Return which points of a line to keep, so that no other is farther from it (n,)."""
-    kept = np.zeros(len(points), dtype=bool)
-    kept[[0, -1]] = True
+    is_retained = np.zeros(len(points), dtype=bool)
+    is_retained[[0, -1]] = True
     open_parts = [(0, len(points) - 1)]
     while open_parts:
         first, last = open_parts.pop()
@@ -61,9 +61,9 @@ def simplified(points: np.ndarray, tolerance: float) -> np.ndarray:
         worst = int(np.argmax(off))
         if off[worst] > tolerance:
             middle = first + 1 + worst
-            kept[middle] = True
+            is_retained[middle] = True
             open_parts += [(first, middle), (middle, last)]
-    return kept
+    return is_retained
 
 
 def parts_off_the_seam(lon: np.ndarray) -> list[slice]:
@@ -78,13 +78,13 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("package", type=Path, help="the unpacked npm package world-atlas")
     parser.add_argument("out", type=Path, help="folder of coast.npz")
-    given = parser.parse_args()
-    atlas = json.loads((given.package / "countries-10m.json").read_text(encoding="utf-8"))
+    options = parser.parse_args()
+    atlas = json.loads((options.package / "countries-10m.json").read_text(encoding="utf-8"))
     scale = np.array(atlas["transform"]["scale"])
     translate = np.array(atlas["transform"]["translate"])
     countries = atlas["objects"]["countries"]["geometries"]
     uses = Counter(arc for country in countries for arc in set(arcs_of(country)))
-    kept, is_border = [], []
+    lines, is_border = [], []
     for number, count in sorted(uses.items()):
         grid = np.cumsum(np.array(atlas["arcs"][number]), axis=0)
         lonlat = grid * scale + translate
@@ -93,19 +93,19 @@ def main() -> None:
         # degrees of longitude count as far as they are at this latitude
         flat = lonlat * [np.cos(np.radians(lonlat[:, 1].mean())), 1.0]
         for part in parts_off_the_seam(lonlat[:, 0]):
-            kept.append(grid[part][simplified(flat[part], TOLERANCE_DEG)])
+            lines.append(grid[part][simplified(flat[part], TOLERANCE_DEG)])
             is_border.append(count > 1)
-    steps = np.concatenate([np.diff(line, axis=0, prepend=0) for line in kept])
+    steps = np.concatenate([np.diff(line, axis=0, prepend=0) for line in lines])
     np.savez_compressed(
-        given.out / "coast.npz",
+        options.out / "coast.npz",
         steps=steps.T.astype(np.int32),
-        lengths=np.array([len(line) for line in kept], dtype=np.int32),
+        lengths=np.array([len(line) for line in lines], dtype=np.int32),
         is_border=np.array(is_border),
         scale=scale,
         translate=translate,
     )
-    size = (given.out / "coast.npz").stat().st_size
-    print(f"{len(kept)} lines, {len(steps)} points, {size:,} bytes")
+    size = (options.out / "coast.npz").stat().st_size
+    print(f"{len(lines)} lines, {len(steps)} points, {size:,} bytes")
 
 
 if __name__ == "__main__":

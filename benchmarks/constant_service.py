@@ -35,7 +35,7 @@ async def constant(p2: float, kr: float, pgv: float) -> dict[str, float | str]: 
 
 
 @app.get("/model")
-async def model(asked: Annotated[PredictQuery, Query()]) -> dict[str, float | str]:  # noqa: ARG001
+async def model(query: Annotated[PredictQuery, Query()]) -> dict[str, float | str]:  # noqa: ARG001
     """Take the parameters of `/v1/predict` as FastAPI reads such a model."""
     return ANSWER
 
@@ -52,11 +52,11 @@ def main() -> None:
     config = uvicorn.Config(
         "benchmarks.constant_service:app", workers=workers, access_log=False, log_level="warning"
     )
-    with listener("127.0.0.1", port) as found:
+    with listener("127.0.0.1", port) as socket:
         if workers == 1:
-            uvicorn.Server(config).run(sockets=[found])
+            uvicorn.Server(config).run(sockets=[socket])
         else:
-            Workers(config, sockets=[found]).run()
+            Workers(config, sockets=[socket]).run()
 
 
 if __name__ == "__main__":

@@ -83,18 +83,18 @@ def main(arguments: Sequence[str] | None = None) -> None:
         pulses, real = (SLUMPS, REAL_SLUMPS) if kind == "slumping" else (CONFINED, REAL_CONFINED)
         cells, drawn = [], []
         for name, case in pulses.items():
-            answer, free = both(case, half_sines(case.lobes), DT_S)
-            cells.append(row(name, case, answer, free))
-            drawn.append((name, answer, free))
+            answer, simulated = both(case, half_sines(case.lobes), DT_S)
+            cells.append(row(name, case, answer, simulated))
+            drawn.append((name, answer, simulated))
         for record, case in real.items():
             if not (root / record).is_file():
                 continue
             motion = read_motions(root / record)[0]
             assert motion.dt_s is not None
-            answer, free = both(case, motion.acceleration_g, motion.dt_s)
+            answer, simulated = both(case, motion.acceleration_g, motion.dt_s)
             name = Path(record).name
-            cells.append(row(name, case, answer, free))
-            drawn.append((name, answer, free))
+            cells.append(row(name, case, answer, simulated))
+            drawn.append((name, answer, simulated))
         headers = [
             "motion", "α1, α3, β, φ1, φ2 [deg]", "r3 [m]", "peak θ [rad]", "peak, simulated",
             "greatest difference over peak",
@@ -133,21 +133,29 @@ def yields(*, write: bool) -> None:
     ]
     rows = []
     for mode in MODES:
-        of_mode = [each for each in compared if each.by_formulas.mode == mode]
+        of_mode = [comparison for comparison in compared if comparison.by_formulas.mode == mode]
         limit = np.abs([difference for _, difference in limit_differences(of_mode)])
         ramp = np.abs([difference for _, difference in ramp_differences(of_mode)])
-        silent = [each for each in of_mode if each.ramp_g is None]
-        weak = [each for each in of_mode if each.by_formulas.yield_acceleration <= 0.0]
-        at_once = [each for each in weak if each.ramp_g is not None and each.ramp_g < AT_ONCE_G]
+        silent = [comparison for comparison in of_mode if comparison.ramp_g is None]
+        weak = [
+            comparison for comparison in of_mode if comparison.by_formulas.yield_acceleration <= 0.0
+        ]
+        at_once = [
+            comparison
+            for comparison in weak
+            if comparison.ramp_g is not None and comparison.ramp_g < AT_ONCE_G
+        ]
         beyond = [
-            each for each in silent if each.by_formulas.yield_acceleration > MOST_G - BEHIND_G
+            comparison
+            for comparison in silent
+            if comparison.by_formulas.yield_acceleration > MOST_G - BEHIND_G
         ]
         rows.append(
             [
                 mode.replace("_", " "),
                 str(len(of_mode)),
                 f"{limit.size}: {limit.max():.0e}" if limit.size else "none",
-                str(sum(each.finite and not each.decided for each in of_mode)),
+                str(sum(comparison.finite and not comparison.decided for comparison in of_mode)),
                 f"{ramp.size}: {np.median(ramp):.4f}, {ramp.max():.4f}",
                 f"{len(beyond)} of {len(silent)}",
                 f"{len(at_once)} of {len(weak)}",
@@ -166,18 +174,26 @@ def yields(*, write: bool) -> None:
 def limit_differences(compared: Sequence[Compared]) -> list[tuple[float, float]]:
     """Return yields and their differences from limit analysis where it has one answer [g]."""
     return [
-        (each.by_formulas.yield_acceleration, each.by_formulas.yield_acceleration - each.limit_g)
-        for each in compared
-        if each.finite and each.decided
+        (
+            comparison.by_formulas.yield_acceleration,
+            comparison.by_formulas.yield_acceleration - comparison.limit_g,
+        )
+        for comparison in compared
+        if comparison.finite and comparison.decided
     ]
 
 
 def ramp_differences(compared: Sequence[Compared]) -> list[tuple[float, float]]:
     """Return yields of blocks that rest and their differences from the springs' [g]."""
     return [
-        (each.by_formulas.yield_acceleration, each.by_formulas.yield_acceleration - each.ramp_g)
-        for each in compared
-        if each.finite and each.by_formulas.yield_acceleration > 0.0 and each.ramp_g is not None
+        (
+            comparison.by_formulas.yield_acceleration,
+            comparison.by_formulas.yield_acceleration - comparison.ramp_g,
+        )
+        for comparison in compared
+        if comparison.finite
+        and comparison.by_formulas.yield_acceleration > 0.0
+        and comparison.ramp_g is not None
     ]
 
 
@@ -186,7 +202,7 @@ def draw_yields(compared: Sequence[Compared]) -> None:
     figure = new_figure(width_in=7.6, height_in=5.8)
     above, below = figure.subplots(2, 1, sharex=True)
     for mode in MODES:
-        of_mode = [each for each in compared if each.by_formulas.mode == mode]
+        of_mode = [comparison for comparison in compared if comparison.by_formulas.mode == mode]
         for axes, pairs, scale in (
             (above, limit_differences(of_mode), 1e15),
             (below, ramp_differences(of_mode), 1.0),
@@ -220,13 +236,13 @@ def end_s(case: Case, answer: Response) -> float:
     return case.until
 
 
-def row(name: str, case: Case, answer: Response, free: Simulated) -> list[str]:
+def row(name: str, case: Case, answer: Response, on_springs: Simulated) -> list[str]:
     sign = 1.0 if answer.kind == "slumping" else -1.0
-    here = free.time_s <= end_s(case, answer)
+    is_compared = on_springs.time_s <= end_s(case, answer)
     assert answer.history is not None
     shown = answer.history.time_s <= end_s(case, answer)
     peak = float(answer.history.theta_rad[shown].max())
-    simulated = float((sign * free.turned_rad)[here].max())
+    simulated = float((sign * on_springs.turned_rad)[is_compared].max())
     angles = (case.alpha1, case.alpha3, case.beta, case.phi, case.back)
     return [
         name,
@@ -234,23 +250,23 @@ def row(name: str, case: Case, answer: Response, free: Simulated) -> list[str]:
         f"{case.r3:g}",
         f"{peak:.6f}",
         f"{simulated:.6f}",
-        f"{deviation(answer, free, end_s(case, answer), sign) / peak:.1e}",
+        f"{deviation(answer, on_springs, end_s(case, answer), sign) / peak:.1e}",
     ]
 
 
 def draw(drawn: list[tuple[str, Response, Simulated]], kind: str) -> None:
     figure = new_figure(width_in=8.0, height_in=5.2)
-    for axes, (name, answer, free) in zip(figure.subplots(2, 2).flat, drawn, strict=True):
+    for axes, (name, answer, simulated) in zip(figure.subplots(2, 2).flat, drawn, strict=True):
         sign = 1.0 if answer.kind == "slumping" else -1.0
         history = answer.history
         assert history is not None
         assert answer.started_s is not None
         assert answer.stopped_s is not None
-        last = min(answer.stopped_s + 0.15, float(free.time_s[-1]))
-        here = free.time_s <= last
+        last = min(answer.stopped_s + 0.15, float(simulated.time_s[-1]))
+        is_compared = simulated.time_s <= last
         axes.plot(
-            free.time_s[here], 1e3 * sign * free.turned_rad[here], color="#c44e52", lw=3.0,
-            alpha=0.45, label="free block on springs",
+            simulated.time_s[is_compared], 1e3 * sign * simulated.turned_rad[is_compared],
+            color="#c44e52", lw=3.0, alpha=0.45, label="free block on springs",
         )  # fmt: skip
         ours = history.time_s <= min(last, answer.stopped_s)
         axes.plot(

@@ -21,13 +21,13 @@ from scipy.special import ndtri, stdtrit
 
 from benchmarks.joint_failures import MODELS, Study
 from benchmarks.joint_failures import PAGE as RANGES_PAGE
-from benchmarks.model_acceptance import Mark, acceptance_table
+from benchmarks.model_choice import Mark, acceptance_table
 from benchmarks.page import ROOT, markdown, parser, write_table
 from rbfrag.db.location import REFERENCE
 from rbfrag.fragility.confidence import ParameterErrors, packed, quantiles_of
 from rbfrag.fragility.dependence import Dependence
-from rbfrag.fragility.fit.clusters import cr3, event_derivatives, jackknife_steps
 from rbfrag.fragility.fit.likelihood import Binomial, maximise
+from rbfrag.fragility.fit.result import cr3, event_derivatives, jackknife_steps
 from rbfrag.fragility.joint import COMPONENTS, overdispersion, share_range
 from rbfrag.fragility.joint_sampling import JointSampler
 from rbfrag.fragility.method import arrays
@@ -111,14 +111,14 @@ def coverage(
     generator = np.random.default_rng(seed)
     rows = model.rows.data
     p, true = rows.probability(model.b), rows.probability(steeper * model.b)
-    usable = np.flatnonzero((p > BETWEEN[0]) & (p < BETWEEN[1]))
+    between = np.flatnonzero((p > BETWEEN[0]) & (p < BETWEEN[1]))
     held = np.zeros((len(INTERVALS), sets, BLOCKS), dtype=np.bool_)
     half = np.zeros((sets, BLOCKS))
     drawn = _outcomes(JointSampler(law, model.placement), true, sets, generator)
     for number, failed in enumerate(drawn):
         fitted = replace(rows, outcome=failed)
         b = maximise(fitted, model.b, tolerance=1e-9)[0]
-        x = rows.columns[generator.choice(usable, BLOCKS, replace=False)]
+        x = rows.columns[generator.choice(between, BLOCKS, replace=False)]
         low, high = intervals(fitted, b, x, generator)
         truth = x @ model.b - x @ b
         held[:, number] = (low <= truth) & (truth <= high)
@@ -234,8 +234,8 @@ def _bias(cells: pd.DataFrame, laws: Mapping[str, Dependence], sides: int) -> fl
     """Return the greatest standardised difference between what fell and P over the classes."""
     p, n = cells["p"].to_numpy(), cells["n"].to_numpy()
     rho = [
-        float(overdispersion(np.array(one), laws[event], number // sides))
-        for event, one, number in zip(cells["earthquake"], p, n, strict=True)
+        float(overdispersion(np.array(probability), laws[event], number // sides))
+        for event, probability, number in zip(cells["earthquake"], p, n, strict=True)
     ]
     sums = pd.DataFrame({
         "class": cells["class"], "earthquake": cells["earthquake"],
@@ -251,16 +251,16 @@ def _bias(cells: pd.DataFrame, laws: Mapping[str, Dependence], sides: int) -> fl
 def _like_blocks(blocks: pd.DataFrame, sides: int) -> pd.DataFrame:
     """Return one block of each size and class of P on every side of sites that have all of them."""
     p = blocks["probability"]
-    own = blocks[(p > CLASSES[0]) & (p < CLASSES[-1])].copy()
-    number = np.digitize(own["probability"], CLASSES)
+    selected = blocks[(p > CLASSES[0]) & (p < CLASSES[-1])].copy()
+    number = np.digitize(selected["probability"], CLASSES)
     bounds = ndtri(np.array(CLASSES))
     middle = 0.5 * (bounds[number] + bounds[number - 1])
-    own["class"] = number
-    own["away"] = np.abs(ndtri(own["probability"].to_numpy()) - middle)
-    own = own.sort_values("away", kind="stable")
+    selected["class"] = number
+    selected["away"] = np.abs(ndtri(selected["probability"].to_numpy()) - middle)
+    selected = selected.sort_values("away", kind="stable")
     place = ["earthquake", "site", "p2", "class"]
-    own = own.drop_duplicates([*place, "component", "polarity"])
-    return own[own.groupby(place)["failed"].transform("size") == sides]
+    selected = selected.drop_duplicates([*place, "component", "polarity"])
+    return selected[selected.groupby(place)["failed"].transform("size") == sides]
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -291,32 +291,42 @@ def range_table(ranges: Mapping[str, RangeCoverage]) -> str:
     """Return what the ranges of one earthquake hold, by model."""
     heads = ["model", "by earthquake and class", "cells", "sites", "at one site", "cells", "bias"]
     return markdown((heads, [
-        [name, f"{one.cells:.3f}", str(one.numbers[0]), f"{one.sites:.1f}",
-         f"{one.one_site:.3f}", str(one.numbers[1]), f"{one.bias:.1f}"]
-        for name, one in ranges.items()
+        [name, f"{held.cells:.3f}", str(held.numbers[0]), f"{held.sites:.1f}",
+         f"{held.one_site:.3f}", str(held.numbers[1]), f"{held.bias:.1f}"]
+        for name, held in ranges.items()
     ]))  # fmt: skip
 
 
 def coverage_table(result: Mapping[str, Coverage]) -> str:
     """Return coverage by way and model."""
     rows = [
-        [way, *(f"{one.share[i]:.3f} ± {one.error[i]:.3f}" for one in result.values())]
+        [
+            way,
+            *(f"{held.share[i]:.3f} ± {held.error[i]:.3f}" for held in result.values()),
+        ]
         for i, way in enumerate(INTERVALS)
     ]
-    width = ["half width in eta", *(f"{one.half_width.mean():.2f}" for one in result.values())]
+    width = [
+        "half width in eta",
+        *(f"{held.half_width.mean():.2f}" for held in result.values()),
+    ]
     return markdown(([f"nominal {LEVEL:g}", *result], [*rows, width]))
 
 
 def marks(result: Mapping[str, Coverage], ranges: Mapping[str, RangeCoverage]) -> list[Mark]:
     """Return the aims, with what is reached."""
-    found = [
-        Mark(name, "intervals that hold P", *HELD, float(one.share[-1]))
-        for name, one in result.items()
+    table_marks = [
+        Mark(name, "intervals that hold P", *HELD, float(held.share[-1]))
+        for name, held in result.items()
     ]
-    for name, one in ranges.items():
-        found.append(Mark(name, "ranges of one earthquake that hold", CELLS, np.inf, one.cells))
-        found.append(Mark(name, "ranges at one site that hold", ONE_SITE, np.inf, one.one_site))
-    return found
+    for name, held in ranges.items():
+        table_marks.append(
+            Mark(name, "ranges of one earthquake that hold", CELLS, np.inf, held.cells)
+        )
+        table_marks.append(
+            Mark(name, "ranges at one site that hold", ONE_SITE, np.inf, held.one_site)
+        )
+    return table_marks
 
 
 if __name__ == "__main__":

@@ -13,9 +13,8 @@ import numpy as np
 
 from benchmarks.cvode import cvode_is_installed, cvode_run
 from benchmarks.page import find_records, markdown, parser, report, write_csv
-from rbfrag.bench.cases import BenchCase, Records
-from rbfrag.bench.timing import ratio, seconds, spread, timed_in_turns
-from rbfrag.bench.work_precision import taylor_run
+from rbfrag.bench.peers import BenchCase, Records
+from rbfrag.bench.work_precision import ratio, seconds, spread, taylor_run, timed_in_turns
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.solver.excitation import excitation
 from rbfrag.solver.integrator.batch import simulate_many

@@ -9,10 +9,10 @@ import importlib
 from importlib.util import find_spec
 from typing import Any
 
-from rbfrag.bench.cases import BenchCase
 from rbfrag.bench.peers import (
     ATOL_PARTS,
     GRACE,
+    BenchCase,
     PeerAnswer,
     PeerExcursion,
     PeerProblem,

@@ -75,16 +75,16 @@ def _cut(text: bytearray, random: Random) -> bytearray:
 
 def _number(text: bytearray, random: Random) -> bytearray:
     at = _at(text, random)
-    found = NUMBER.search(text, at)
-    if found:
+    match = NUMBER.search(text, at)
+    if match:
         value = random.choice(VALUES)
         if random.random() < 0.3:
-            digits = bytearray(found[0])
+            digits = bytearray(match[0])
             digits[random.randrange(len(digits))] = random.choice(b"0123456789.-")
             value = bytes(digits)
         if random.random() < 0.5:
-            value = value.rjust(len(found[0]))[: max(len(found[0]), 1)]
-        text[found.start() : found.end()] = value
+            value = value.rjust(len(match[0]))[: max(len(match[0]), 1)]
+        text[match.start() : match.end()] = value
     return text
 
 

@@ -17,8 +17,10 @@ from rbfrag.db.schema import (
     earthquake,
     fragility_model,
     motion,
+    motion_spectrum,
     outcome_interval,
     recording,
+    recording_spectrum,
     response,
     shock_pair,
     simulation,
@@ -71,7 +73,7 @@ def _plain(value: object) -> object:
     return value
 
 
-def _own(table: Any, *without: str) -> list[Any]:
+def _own_columns(table: Any, *without: str) -> list[Any]:
     skipped = _INCIDENTAL.union(without)
     return [column for column in table.c if column.name not in skipped]
 
@@ -85,14 +87,15 @@ def _queries() -> dict[str, Select[Any]]:
             *_motion_key,
             vertical.c.samples_sha256,
             vertical.c.dt_s,
-            *_own(table, "natural_key", "motion_id", "vertical_motion_id"),
+            *_own_columns(table, "natural_key", "motion_id", "vertical_motion_id"),
         ).select_from(with_motions(table))
         for table in (combination, response)
     }
     first = motion.alias("first")
+    other_keys = first.c.samples_sha256, *_motion_key
     return {
-        "earthquake": select(*_own(earthquake)),
-        "recording": select(*event_key, *_own(recording, "earthquake_id")).select_from(
+        "earthquake": select(*_own_columns(earthquake)),
+        "recording": select(*event_key, *_own_columns(recording, "earthquake_id")).select_from(
             recording.join(earthquake)
         ),
         "motion": select(
@@ -100,34 +103,43 @@ def _queries() -> dict[str, Select[Any]]:
             *event_key,
             recording.c.name,
             recording.c.station,
-            *_own(motion, "recording_id", "samples_sha256", "dt_s"),
+            *_own_columns(motion, "recording_id", "samples_sha256", "dt_s"),
         ).select_from(motion.join(recording).join(earthquake)),
-        "suite": select(*_own(suite)),
+        "suite": select(*_own_columns(suite)),
         "suite_motion": select(suite.c.name, *_motion_key).select_from(
             suite_motion.join(suite).join(motion)
         ),
+        "motion_spectrum": select(
+            *_motion_key, *_own_columns(motion_spectrum, "motion_id")
+        ).select_from(motion_spectrum.join(motion)),
+        "recording_spectrum": select(
+            *other_keys, *_own_columns(recording_spectrum, "motion_id", "other_motion_id")
+        ).select_from(
+            recording_spectrum.join(motion, motion.c.id == recording_spectrum.c.motion_id).join(
+                first, first.c.id == recording_spectrum.c.other_motion_id
+            )
+        ),
         "toppling_spectrum": select(
-            *_motion_key, *_own(toppling_spectrum, "motion_id")
+            *_motion_key, *_own_columns(toppling_spectrum, "motion_id")
         ).select_from(toppling_spectrum.join(motion)),
         "combination": labelled[combination],
         "outcome_interval": select(
-            combination_key, *_own(outcome_interval, "combination_id")
+            combination_key, *_own_columns(outcome_interval, "combination_id")
         ).select_from(outcome_interval.join(combination)),
-        "simulation": select(combination_key, *_own(simulation, "combination_id")).select_from(
-            simulation.join(combination)
-        ),
+        "simulation": select(
+            combination_key, *_own_columns(simulation, "combination_id")
+        ).select_from(simulation.join(combination)),
         "response": labelled[response],
         "shock_pair": select(
             shock_pair.c.natural_key,
-            first.c.samples_sha256,
-            *_motion_key,
-            *_own(shock_pair, "natural_key", "first_motion_id", "second_motion_id"),
+            *other_keys,
+            *_own_columns(shock_pair, "natural_key", "first_motion_id", "second_motion_id"),
         ).select_from(
             shock_pair.join(motion, motion.c.id == shock_pair.c.second_motion_id).join(
                 first, first.c.id == shock_pair.c.first_motion_id
             )
         ),
-        "fragility_model": select(*_own(fragility_model)),
+        "fragility_model": select(*_own_columns(fragility_model)),
     }
 
 

@@ -27,7 +27,7 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.database_content import content_digest
-from rbfrag.db.check.database import check_database
+from rbfrag.db.check import check_database
 from rbfrag.db.engine import opened_database
 from rbfrag.db.motions import add_motion
 from rbfrag.db.queries import database_info
@@ -49,14 +49,14 @@ class Kill:
         combinations: how many were stored when it came.
         status: exit status of the main process.
         orphans: workers that outlived the main process by ten seconds.
-        said: what the main process wrote to standard error at the end.
+        output: what the main process wrote to standard error at the end.
     """
 
     target: str
     combinations: int
     status: int
     orphans: int
-    said: str
+    output: str
 
 
 def make_database(place: str, motions: int, npts: int = 600) -> None:
@@ -143,9 +143,9 @@ def kill_once(
     time.sleep(rng.uniform(0.0, 0.1))
     workers = workers_of(running.pid)
     if running.poll() is not None or (target == "worker" and not workers):
-        said = running.communicate()[1]
+        output = running.communicate()[1]
         if running.returncode:
-            raise AssertionError(f"the campaign failed by itself: {said}")
+            raise AssertionError(f"the campaign failed by itself: {output}")
         return None
     reached = stored(place)
     try:
@@ -153,14 +153,14 @@ def kill_once(
     except ProcessLookupError:
         running.communicate()
         return None
-    said = running.communicate(timeout=PATIENCE_S)[1]
+    output = running.communicate(timeout=PATIENCE_S)[1]
     if target == "worker" and running.returncode == 0:
         return None  # it had done its work
     end = time.monotonic() + 10.0
-    while (left := [pid for pid in workers if _lives(pid)]) and time.monotonic() < end:
+    while (alive := [pid for pid in workers if _lives(pid)]) and time.monotonic() < end:
         time.sleep(0.02)
-    lines = said.strip().splitlines()
-    return Kill(target, reached, running.returncode, len(left), lines[-1] if lines else "")
+    lines = output.strip().splitlines()
+    return Kill(target, reached, running.returncode, len(alive), lines[-1] if lines else "")
 
 
 def workers_of(pid: int) -> list[int]:
@@ -202,10 +202,10 @@ def kill_and_resume(
     """
     rng = random.Random(seed)
     for _ in range(kills):
-        done = kill_once(place, blocks, jobs, rng, rng.choice(("main", "worker")), per_motion)
-        if done is None:
+        kill = kill_once(place, blocks, jobs, rng, rng.choice(("main", "worker")), per_motion)
+        if kill is None:
             return
-        yield done
+        yield kill
 
 
 @contextmanager
@@ -218,16 +218,16 @@ def two_places(server: str | None, folder: Path) -> Iterator[tuple[str, str]]:
     from psycopg import sql
 
     with psycopg.connect(server, autocommit=True) as connection, ExitStack() as stack:
-        places = []
+        databases = []
         for _ in range(2):
             schema = f"rbfrag_durability_{secrets.token_hex(6)}"
             name = sql.Identifier(schema)
             connection.execute(sql.SQL("CREATE SCHEMA {}").format(name))
             drop = sql.SQL("DROP SCHEMA {} CASCADE").format(name)
             stack.callback(connection.execute, drop)
-            places.append(f"{server}?options=-csearch_path%3D{schema}")
+            databases.append(f"{server}?options=-csearch_path%3D{schema}")
         connection.execute("SET client_min_messages = warning")
-        yield places[0], places[1]
+        yield databases[0], databases[1]
 
 
 def main() -> int:
@@ -241,37 +241,37 @@ def main() -> int:
     parser.add_argument("--sequence", action="store_true")
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--server", help="PostgreSQL URL; without it SQLite")
-    asked = parser.parse_args()
-    blocks = ["--kind", asked.kind, *(["--sequence"] if asked.sequence else [])]
-    if asked.kind in ("toppling", "rocking"):
-        blocks += ["--p2", asked.p2 or "10,1"]
+    options = parser.parse_args()
+    blocks = ["--kind", options.kind, *(["--sequence"] if options.sequence else [])]
+    if options.kind in ("toppling", "rocking"):
+        blocks += ["--p2", options.p2 or "10,1"]
     with (
         tempfile.TemporaryDirectory() as folder,
-        two_places(asked.server, Path(folder)) as (killed, undisturbed),
+        two_places(options.server, Path(folder)) as (killed, undisturbed),
     ):
         for place in (killed, undisturbed):
-            make_database(place, asked.motions)
-        run_to_the_end(undisturbed, blocks, asked.jobs)
-        whole = stored(undisturbed)
-        done = []
+            make_database(place, options.motions)
+        run_to_the_end(undisturbed, blocks, options.jobs)
+        expected = stored(undisturbed)
+        kills = []
         for kill in kill_and_resume(
-            killed, blocks, kills=asked.kills, seed=asked.seed, jobs=asked.jobs,
-            per_motion=whole // asked.motions,
+            killed, blocks, kills=options.kills, seed=options.seed, jobs=options.jobs,
+            per_motion=expected // options.motions,
         ):  # fmt: skip
-            done.append(kill)
+            kills.append(kill)
             print(
-                f"kill {len(done):2d}: {kill.target:6s} at {kill.combinations}/{whole} "
+                f"kill {len(kills):2d}: {kill.target:6s} at {kill.combinations}/{expected} "
                 f"combinations, exit status {kill.status}, orphans {kill.orphans}",
                 flush=True,
             )
-        run_to_the_end(killed, blocks, asked.jobs)
+        run_to_the_end(killed, blocks, options.jobs)
         equal = digest(killed) == digest(undisturbed)
-        main_kills = sum(kill.target == "main" for kill in done)
+        main_kills = sum(kill.target == "main" for kill in kills)
         print(
-            f"{len(done)} kills ({main_kills} of the main process), {stored(killed)} combinations, "
-            f"contents {'equal' if equal else 'DIFFER'}"
+            f"{len(kills)} kills ({main_kills} of the main process), {stored(killed)} "
+            f"combinations, contents {'equal' if equal else 'DIFFER'}"
         )
-        return 0 if equal and not any(kill.orphans for kill in done) else 1
+        return 0 if equal and not any(kill.orphans for kill in kills) else 1
 
 
 if __name__ == "__main__":

@@ -47,12 +47,12 @@ def errors(model: FragilityModel, measure: str, levels: int) -> tuple[FloatArray
         x = np.geomspace(function.levels[1], function.levels[-1], 4000)[:-1]
         grid = np.geomspace(function.levels[1], function.levels[-1], levels)
         p, on_grid = (
-            array_answer(model, {**block, measure: each}, interval=False).probability
-            for each in (x, grid)
+            array_answer(model, {**block, measure: levels}, interval=False).probability
+            for levels in (x, grid)
         )
         seen = p > FLOOR
         shown = function.at(x), np.interp(x, grid, on_grid)
-        both.append([np.abs(each[seen] / p[seen] - 1.0).max() for each in shown])
+        both.append([np.abs(levels[seen] / p[seen] - 1.0).max() for levels in shown])
     exported, equal = np.array(both).T
     return exported, equal
 
@@ -61,7 +61,7 @@ def main() -> None:
     """Measure, print and draw."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--write", action="store_true", help="draw the figure")
-    given = parser.parse_args()
+    options = parser.parse_args()
     drawn: dict[str, tuple[FloatArray, FloatArray]] = {}
     for row in read_models(REFERENCE):
         inputs = TERMS[row.term].inputs
@@ -75,7 +75,7 @@ def main() -> None:
             )  # fmt: skip
             if levels == 80:
                 drawn[row.name] = exported, equal
-    if given.write:
+    if options.write:
         draw(drawn)
 
 

@@ -23,9 +23,9 @@ CAPTION = re.compile(r"Drawn by\*\s+`rbfrag\s+((?:plot|block|rockmass|report)\s[
 def commands(docs: Path = ROOT / "docs") -> list[tuple[Path, list[str]]]:
     """Return the page and the arguments of each caption's command."""
     return [
-        (page, shlex.split(found))
+        (page, shlex.split(command))
         for page in sorted(docs.rglob("*.md"))
-        for found in CAPTION.findall(page.read_text(encoding="utf-8"))
+        for command in CAPTION.findall(page.read_text(encoding="utf-8"))
     ]
 
 
@@ -40,14 +40,14 @@ def main(arguments: Sequence[str] | None = None) -> None:
     options.add_argument("--only", help="a part of the names of the figures to draw")
     options.add_argument("--list", action="store_true", help="print the commands, draw nothing")
     chosen = options.parse_args(arguments)
-    for _, asked in commands():
-        if chosen.only is not None and chosen.only not in figure_of(asked):
+    for _, command in commands():
+        if chosen.only is not None and chosen.only not in figure_of(command):
             continue
-        print(shlex.join(["rbfrag", *asked]), flush=True)
+        print(shlex.join(["rbfrag", *command]), flush=True)
         if not chosen.list:
             start = "from rbfrag.cli.main import run; run()"
             subprocess.run(
-                [sys.executable, "-c", start, *asked],
+                [sys.executable, "-c", start, *command],
                 cwd=ROOT, check=True, stdout=subprocess.DEVNULL,
             )  # fmt: skip
 

@@ -26,13 +26,13 @@ def floors(project: Path = ROOT / "pyproject.toml") -> dict[str, str]:
         ValueError: a dependency without a lower bound.
     """
     about = tomllib.loads(project.read_text(encoding="utf-8"))["project"]
-    wanted = list(about["dependencies"])
+    requirements = list(about["dependencies"])
     for extra, names in about["optional-dependencies"].items():
         if extra not in TOOLS:
             # an extra that names others of this package: theirs are here already
-            wanted += [name for name in names if not name.startswith("rbfrag[")]
+            requirements += [name for name in names if not name.startswith("rbfrag[")]
     lowest = {}
-    for dependency in wanted:
+    for dependency in requirements:
         match = _BOUND.match(dependency)
         if match is None:
             raise ValueError(f"{dependency} states no lowest version")

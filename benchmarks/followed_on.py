@@ -158,7 +158,7 @@ def _slide(mass: Realisations, j: int, excited: Excitation) -> Simulation:
         yield_g=None,
         settings={},
     )
-    return simulate_block(sliding.mechanism(site), site, excited)
+    return simulate_block(sliding.MODEL.mechanism(site), site, excited)
 
 
 HEADERS = [
@@ -167,23 +167,23 @@ HEADERS = [
 ]  # fmt: skip
 
 
-def row(each: Beside) -> list[str]:
-    angles = (each.block.alpha1_deg, each.block.alpha3_deg, *each.planes)
-    ours = each.answer.displacement_m
-    theirs = [float(simulated.heel_m[-1]) for simulated in each.springs]
-    cells = [each.name, ", ".join(f"{angle:.3g}" for angle in angles)]
+def row(case: Beside) -> list[str]:
+    angles = (case.block.alpha1_deg, case.block.alpha3_deg, *case.planes)
+    ours = case.answer.displacement_m
+    theirs = [float(simulated.heel_m[-1]) for simulated in case.springs]
+    cells = [case.name, ", ".join(f"{angle:.3g}" for angle in angles)]
     if ours is None:
-        return [*cells, each.answer.outcome.value, *(f"{slip:.4f}" for slip in theirs), *["-"] * 5]
+        return [*cells, case.answer.outcome.value, *(f"{slip:.4f}" for slip in theirs), *["-"] * 5]
     cells += [f"{ours:.4f}", *(f"{slip:.4f}" for slip in theirs), f"{ours / theirs[0] - 1.0:+.1%}"]
-    return [*cells, *_times(each)]
+    return [*cells, *_times(case)]
 
 
-def _times(each: Beside) -> list[str]:
+def _times(case: Beside) -> list[str]:
     """When a slide begins to tip back, and when it first leans."""
-    history, simulated = each.answer.history, each.springs[0]
-    if each.answer.kind != model_of_mode("slide").kind or history is None:
+    history, simulated = case.answer.history, case.springs[0]
+    if case.answer.kind != model_of_mode("slide").kind or history is None:
         return ["-"] * 4
-    leans_rad = first_rest_rad(each.answer)
+    leans_rad = first_rest_rad(case.answer)
     cells = []
     for part in (0.02, 0.98):
         ours = first_time(history.time_s, history.theta_rad > part * leans_rad)
@@ -198,8 +198,8 @@ def summary(cases: Sequence[Beside]) -> str:
     for damping, place in zip(DAMPINGS, range(len(DAMPINGS)), strict=True):
         apart = np.array(
             [
-                abs((each.answer.displacement_m or math.nan) / each.springs[place].heel_m[-1] - 1.0)
-                for each in cases
+                abs((case.answer.displacement_m or math.nan) / case.springs[place].heel_m[-1] - 1.0)
+                for case in cases
             ]
         )
         rows.append([
@@ -207,7 +207,7 @@ def summary(cases: Sequence[Beside]) -> str:
             f"{np.nanmax(apart):.1%}", *(str(int((apart <= most).sum())) for most in (0.01, 0.05)),
         ])  # fmt: skip
     softer = np.array([
-        abs(each.springs[1].heel_m[-1] / each.springs[0].heel_m[-1] - 1.0) for each in cases
+        abs(case.springs[1].heel_m[-1] / case.springs[0].heel_m[-1] - 1.0) for case in cases
     ])  # fmt: skip
     rows.append([
         "0.1 beside 0.7", str(softer.size), f"{np.median(softer):.2%}", f"{softer.max():.1%}",
@@ -240,14 +240,14 @@ def main(arguments: Sequence[str] | None = None) -> None:
         text = f"{markdown((HEADERS, map(row, cases)))}\n\n{summary(cases)}"
         report(f"followed-{mode}", text, write=chosen.write, page=PAGE)
     if chosen.write:
-        draw(next(each for each in under_pulses if each.name == "slump in the second"))
+        draw(next(case for case in under_pulses if case.name == "slump in the second"))
 
 
-def draw(each: Beside) -> None:
+def draw(case: Beside) -> None:
     """Draw the geometry of a block that has slid and leans, and one motion in time."""
     figure = new_figure(width_in=8.6, height_in=4.2)
     scene, trace = figure.subplots(1, 2, width_ratios=[1.1, 1.0])
-    block, (beta, *_) = each.block, each.planes
+    block, (beta, *_) = case.block, case.planes
     gamma, b = math.radians(block.gamma_deg), math.radians(beta)
     to_slope = np.array([[math.cos(b), -math.sin(b)], [math.sin(b), math.cos(b)]])
     slid_m = 0.35 * block.base_m
@@ -255,12 +255,12 @@ def draw(each: Beside) -> None:
     turned = math.asin(slid_m * math.sin(gamma) / edge_m)
     c, s = math.cos(turned), math.sin(turned)
     corners, slid = np.array(block.vertices_m), np.array([slid_m, 0.0])
-    places = {
+    panels = {
         "at rest": (corners, ROCK, "--"),
         "slid": (corners + slid, BLUE, ":"),
         "leans": (corners @ np.array([[c, s], [-s, c]]) + slid, BLUE, "-"),
     }
-    for name, (outline, colour, style) in places.items():
+    for name, (outline, colour, style) in panels.items():
         closed = np.concatenate([outline, outline[:1]]) @ to_slope
         scene.plot(*closed.T, style, color=colour, lw=1.6, label=name)
     top = 1.5 * edge_m * np.array([-math.cos(gamma), math.sin(gamma)])
@@ -268,13 +268,13 @@ def draw(each: Beside) -> None:
     scene.plot(*(planes @ to_slope).T, color="black", lw=2.0)
     heel = slid @ to_slope
     scene.annotate("$s$", heel / 2.0, (0, -13), textcoords="offset points", ha="center")
-    upper = places["leans"][0][block.outline.index(block.back)] @ to_slope
+    upper = panels["leans"][0][block.outline.index(block.back)] @ to_slope
     scene.plot(*upper, "o", color=BLUE, ms=4)
     scene.plot(*heel, "o", color=BLUE, ms=4)
     scene.set_aspect("equal")
     scene.legend(fontsize=8, loc="upper right")
     scene.set(xlabel="out of the slope [m]", ylabel="up [m]")
-    history, simulated = each.answer.history, each.springs[0]
+    history, simulated = case.answer.history, case.springs[0]
     assert history is not None
     trace.plot(simulated.time_s, simulated.heel_m, color="#c44e52", lw=3.0, alpha=0.45,
                label="free block on springs: heel [m]")  # fmt: skip

@@ -53,7 +53,7 @@ LARGEST_REAL_BYTES = 400_000
 FEW_SAMPLES = 1000
 """Motions up to this size are filtered as well."""
 
-OTHERS: dict[str, Reader] = {reader.name: reader for reader in READERS}
+READER_BY_NAME: dict[str, Reader] = {reader.name: reader for reader in READERS}
 
 NEEDS: dict[str, tuple[str, float | None]] = {
     **dict.fromkeys(STATE_NO_UNIT, ("g", None)),
@@ -85,35 +85,35 @@ class Tally:
 
 def bases(records: Path | None) -> dict[str, list[bytes]]:
     """Return sound files by format: made-up ones, and small real ones where there are any."""
-    own = "\n".join(rbfrag_csv.write([GroundMotion(shaking(3, 40), 0.02, station="S")])) + "\n"
-    found = {name: [make().encode()] for name, make in WRITTEN.items()}
+    record = "\n".join(rbfrag_csv.write([GroundMotion(shaking(3, 40), 0.02, station="S")])) + "\n"
+    contents = {name: [make().encode()] for name, make in WRITTEN.items()}
     borehole = knet([int(1000.0 * value) for value in shaking(4, 200)], 100, direction="1")
-    found["K-NET/KiK-net ASCII"].append(borehole.encode())
+    contents["K-NET/KiK-net ASCII"].append(borehole.encode())
     series = csmip_v1([("360 Deg", [f".{i:06d}" for i in range(60)])], 0.005)
-    found["CDMG V1"].append(series.encode())
-    found["PEER AT2"] = [at2(TOKENS, 0.005, sampling=form).encode() for form in AT2_SAMPLING]
-    found["GeoNet V2A"] = [v2a([("N28W", DECIMALS), ("UP", DECIMALS)], 0.02).encode()]
-    found["delimited text"] = [
+    contents["CDMG V1"].append(series.encode())
+    contents["PEER AT2"] = [at2(TOKENS, 0.005, sampling=form).encode() for form in AT2_SAMPLING]
+    contents["GeoNet V2A"] = [v2a([("N28W", DECIMALS), ("UP", DECIMALS)], 0.02).encode()]
+    contents["delimited text"] = [
         two_columns(TIMES, TOKENS, header="# T - S-1\n# Time (s),Acceleration (g)\n").encode(),
         two_columns(TIMES, TOKENS, mark="  ").encode(),
         ("\n".join(TOKENS) + "\n").encode(),
     ]
-    found["rbfrag CSV"] = [own.encode()]
-    found["ESM ASC"].append(AFAD_PREAMBLE.encode() + found["ESM ASC"][0])
+    contents["rbfrag CSV"] = [record.encode()]
+    contents["ESM ASC"].append(AFAD_PREAMBLE.encode() + contents["ESM ASC"][0])
     table = [[f"{value * f:.6e}" for f in (100, 60, -30)] for value in shaking(6, 60)]
-    found["SCEC broadband platform"] = [
+    contents["SCEC broadband platform"] = [
         scec_bbp(table, 0.02, columns=form).encode() for form in ("names", "lines", "units")
     ]
-    found["miniSEED"] = [
+    contents["miniSEED"] = [
         miniseed(COUNTS[:400], version=version, record_bytes=512)
         + miniseed(2 * COUNTS[:400], version=version, channel="HNZ")
         for version in (2, 3)
     ]
     if records is not None:
         for name, files in real_files(records).items():
-            found[f"real: {name}"] = files
-    found |= {reader.name: list(reader.sound()) for reader in READERS}
-    return found
+            contents[f"real: {name}"] = files
+    contents |= {reader.name: list(reader.sound()) for reader in READERS}
+    return contents
 
 
 def real_files(records: Path) -> dict[str, list[bytes]]:
@@ -146,7 +146,7 @@ def read_record(name: str, path: Path, random: Random, tally: Tally) -> str:
 
 def failure(name: str, folder: Path, content: bytes, random: Random, tally: Tally) -> str:
     """Return what is wrong with what a reader made of a file; empty when nothing is."""
-    reader = OTHERS.get(name)
+    reader = READER_BY_NAME.get(name)
     suffix = reader.suffix if reader else ""
     path = folder / (suffix if suffix and not suffix.startswith(".") else f"record{suffix}")
     path.write_bytes(content)
@@ -189,10 +189,10 @@ def unfit(motion: GroundMotion) -> str:
     quality_flags(motion)
     if motion.npts < FEW_SAMPLES:
         try:
-            made = processed(motion)
+            derived = processed(motion)
         except InputError:
             return ""
-        if not np.isfinite(made.acceleration_g).all():
+        if not np.isfinite(derived.acceleration_g).all():
             return "samples that are not finite after processing"
     return ""
 
@@ -235,11 +235,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options.add_argument("--records", type=Path, help="folder with MANIFEST.csv: real files too")
     options.add_argument("--only", type=int, help="make this input alone, and keep its file")
     chosen = options.parse_args(arguments)
-    found = bases(chosen.records)
-    names = list(found)
+    files = bases(chosen.records)
+    names = list(files)
     tallies = {name: Tally() for name in names}
-    silences = {name: Silence() for name in names if name not in OTHERS}
-    sound = {name: sound_files(name, found[name]) for name in silences}
+    silences = {name: Silence() for name in names if name not in READER_BY_NAME}
+    sound = {name: sound_files(name, files[name]) for name in silences}
     failures = 0
     warnings.simplefilter("error")
     numbers = range(chosen.inputs) if chosen.only is None else [chosen.only]
@@ -247,16 +247,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
         for number in numbers:
             random = Random(f"{chosen.seed} {number}")
             name = names[number % len(names)]
-            content = damaged(random.choice(found[name]), random)
+            content = damaged(random.choice(files[name]), random)
             tallies[name].inputs += 1
             wrong = failure(name, Path(folder), content, random, tallies[name])
             if wrong:
                 failures += 1
                 print(f"input {number} ({name}): {wrong}", file=sys.stderr)
             if chosen.only is not None:
-                kept = Path(f"fuzz-{chosen.seed}-{number}")
-                kept.write_bytes(content)
-                print(f"kept as {kept}")
+                saved = Path(f"fuzz-{chosen.seed}-{number}")
+                saved.write_bytes(content)
+                print(f"kept as {saved}")
             if name in silences:
                 content = random.choice(sound[name])
                 note(silences[name], name, content, Path(folder) / "record", random)

@@ -16,17 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbfrag.db.engine import opened_database
-from rbfrag.fragility.fit.clusters import cr3, jackknife_steps
-from rbfrag.fragility.fit.data import (
-    KR,
-    Y0_OVER_PGV,
-    FitData,
-    FitSource,
-    fit_data,
-    read_source,
-)
+from rbfrag.fragility.fit.data import KR, Y0_OVER_PGV, FitData, FitSource, fit_data, read_source
 from rbfrag.fragility.fit.likelihood import most_likely
-from rbfrag.fragility.fit.outcomes import OutcomeRows, outcome_rows, parameter_names
+from rbfrag.fragility.fit.maximum_likelihood import OutcomeRows, outcome_rows, parameter_names
+from rbfrag.fragility.fit.result import cr3, jackknife_steps
 from rbfrag.fragility.joint import Placement
 from rbfrag.fragility.measures import TERMS
 from rbfrag.fragility.method import Method
@@ -118,8 +111,8 @@ def outcomes(source: FitSource) -> Outcomes:
     ratio = y / table.pgv_m_s[:, None]
     within = (ratio > Y0_OVER_PGV[0] * 0.999999) & (ratio < Y0_OVER_PGV[-1] * 1.000001)
     within &= source.k_over_pga * table.pga_g[:, None] >= KR[0]
-    known = np.isfinite(source.failed) & within
-    row = np.nonzero(known)[0]
+    is_known = np.isfinite(source.failed) & within
+    row = np.nonzero(is_known)[0]
 
     def numbers(values: NDArray[np.generic]) -> Labels:
         return np.unique(values[row], return_inverse=True)[1].astype(np.intp)
@@ -127,15 +120,15 @@ def outcomes(source: FitSource) -> Outcomes:
     event = numbers(table.event_id.astype(str))
     measures = {"pgv": table.pgv_m_s, "pga": table.pga_g, "tm": table.tm_s, "p2": table.p2}
     return Outcomes(
-        keys=tuple(_keys(source, row, y[known])),
-        failed=source.failed[known],
+        keys=tuple(_keys(source, row, y[is_known])),
+        failed=source.failed[is_known],
         event=event,
         site=numbers(source.recording),
         motion=numbers(table.motion_id),
         polarity=np.where(table.polarity == "forward", 1, -1)[row],
         fold=folds(event),
-        strength=np.rint(np.log(ratio[known] / Y0_OVER_PGV[0]) / STEP).astype(np.intp),
-        value={"y": y[known], "p": np.sqrt(table.p2[row])}
+        strength=np.rint(np.log(ratio[is_known] / Y0_OVER_PGV[0]) / STEP).astype(np.intp),
+        value={"y": y[is_known], "p": np.sqrt(table.p2[row])}
         | {name: column[row] for name, column in measures.items()},
     )
 
@@ -199,7 +192,7 @@ class Study:
         rows: their outcomes with features.
         b: the parameters, shape (k,).
         steps: those of leaving each earthquake out, shape (G, k).
-        own: P of every block of the study by the fit without its earthquake, shape (n,).
+        held_out: P of every block of the study by the fit without its earthquake, shape (n,).
     """
 
     name: str
@@ -207,7 +200,7 @@ class Study:
     rows: OutcomeRows
     b: FloatArray
     steps: FloatArray
-    own: FloatArray
+    held_out: FloatArray
 
     @property
     def errors(self) -> FloatArray:
@@ -243,5 +236,5 @@ def studied(source: FitSource, blocks: Outcomes, name: str, method: Method | Non
     data = fit_data(source, method, term)
     rows = outcome_rows(data, method, term, parameter_names(method, term))
     b = most_likely(rows.data)
-    own = blocks.joined(predictions(source, data, rows.held_out(b)))
-    return Study(name, data, rows, b, jackknife_steps(rows.data, b), own)
+    held_out = blocks.joined(predictions(source, data, rows.held_out(b)))
+    return Study(name, data, rows, b, jackknife_steps(rows.data, b), held_out)

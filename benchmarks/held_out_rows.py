@@ -71,25 +71,25 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 def fitted_without(source: FitSource, aims: Aims) -> dict[str, object]:
     """Return a model that is fitted to all earthquakes but the five."""
-    others = source.only(~np.isin(source.table.event_id.astype(str), FIVE))
+    training = source.only(~np.isin(source.table.event_id.astype(str), FIVE))
     term, method = TERMS[aims.term], method_named(aims.method)
-    row = fit_source(others, term, method, kind=aims.kind, shared=False).report.model.row
-    stated = {"kind": aims.kind, "method": aims.method, "term": aims.term}
-    return {**stated, "coefficients": {k: float(f"{v:.9g}") for k, v in row.coefficients.items()}}
+    row = fit_source(training, term, method, kind=aims.kind).report.model.row
+    settings = {"kind": aims.kind, "method": aims.method, "term": aims.term}
+    return {**settings, "coefficients": {k: float(f"{v:.9g}") for k, v in row.coefficients.items()}}
 
 
 def blocks_of(source: FitSource, aims: Aims) -> Columns:
     """Return the blocks of the five that a model is judged on, in an order of their own."""
     method, term = method_named(aims.method), TERMS[aims.term]
-    own = source.only(np.isin(source.table.event_id.astype(str), FIVE))
-    data = fit_data(own, method, term, kind=aims.kind)
-    known = data.judged.is_known
+    held_out = source.only(np.isin(source.table.event_id.astype(str), FIVE))
+    data = fit_data(held_out, method, term, kind=aims.kind)
+    is_known = data.judged.is_known
     block = (*method.block.names, *method.block.stored)
-    columns = {name: _of(data, name)[known] for name in (*block, *term.inputs)}
-    motion = own.table.motion_id[data.combination]
-    columns |= {"failed": data.failed[known]}
-    columns |= {"motion": np.broadcast_to(motion[:, None], known.shape)[known].astype(float)}
-    side = np.broadcast_to(data.polarity[:, None], known.shape)[known]
+    columns = {name: _of(data, name)[is_known] for name in (*block, *term.inputs)}
+    motion = held_out.table.motion_id[data.combination]
+    columns |= {"failed": data.failed[is_known]}
+    columns |= {"motion": np.broadcast_to(motion[:, None], is_known.shape)[is_known].astype(float)}
+    side = np.broadcast_to(data.polarity[:, None], is_known.shape)[is_known]
     order = np.lexsort([*(columns[name] for name in block), side, columns["motion"]])
     order = order[:: math.ceil(order.size / MOST_BLOCKS)]
     return {name: values[order] for name, values in columns.items()}

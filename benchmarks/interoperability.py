@@ -164,12 +164,14 @@ def run_engine(python: str, job: Job, folder: Path) -> None:
 
 
 def _run(command: list[str], folder: Path, surroundings: dict[str, str] | None = None) -> str:
-    done = subprocess.run(
+    process = subprocess.run(
         command, cwd=folder, env=surroundings, capture_output=True, text=True, check=False
     )
-    if done.returncode:
-        raise SystemExit(f"{' '.join(command)} failed:\n{done.stdout[-2000:]}{done.stderr[-2000:]}")
-    return done.stdout
+    if process.returncode:
+        raise SystemExit(
+            f"{' '.join(command)} failed:\n{process.stdout[-2000:]}{process.stderr[-2000:]}"
+        )
+    return process.stdout
 
 
 def engine_failures(job: Job, folder: Path) -> dict[str, float]:
@@ -213,10 +215,10 @@ def damage_runs(python: str, folder: Path) -> Iterator[tuple[str, float, float]]
         table = folder / f"{measure}.csv"
         rbfrag.export.pelicun(table, 3.0, 0.1, imt=imt, name="block")
         for level in levels:
-            said = _run([python, str(EXAMPLE), str(table), str(level)], folder)
+            output = _run([python, str(EXAMPLE), str(table), str(level)], folder)
             shaking: dict[str, Any] = {measure: level}
-            own = float(rbfrag.predict(3.0, 0.1, **shaking).probability)
-            yield f"{imt} = {level:g}", float(said.split()[-1]), own
+            ours_value = float(rbfrag.predict(3.0, 0.1, **shaking).probability)
+            yield f"{imt} = {level:g}", float(output.split()[-1]), ours_value
 
 
 def main() -> None:
@@ -226,38 +228,36 @@ def main() -> None:
     parser.add_argument(
         "folder", nargs="?", type=Path, help="for the jobs; default: a temporary one"
     )
-    given = parser.parse_args()
-    asked = "from importlib.metadata import version; print(version({!r}))"
+    options = parser.parse_args()
+    version_of = "from importlib.metadata import version; print(version({!r}))"
     engine, pelicun = (
-        _run([given.python, "-c", asked.format(name)], Path()).strip()
+        _run([options.python, "-c", version_of.format(name)], Path()).strip()
         for name in ("openquake-engine", "pelicun")
     )
     worst = 0.0
     with tempfile.TemporaryDirectory() as temporary:
-        folder = (given.folder or Path(temporary)).absolute()
+        folder = (options.folder or Path(temporary)).absolute()
         print(_heading(f"OpenQuake engine {engine}: failures", "engine"))
         for job in JOBS:
-            run_engine(given.python, job, folder / job.mode)
-            theirs, ours = (
-                each(job, folder / job.mode) for each in (engine_failures, own_failures)
-            )
-            for name, own in ours.items():
-                what = f"{job.mode}, {job.imt} {job.component}, {name}"
-                worst = max(worst, _line(what, theirs[name], own))
+            run_engine(options.python, job, folder / job.mode)
+            theirs, ours = (run(job, folder / job.mode) for run in (engine_failures, own_failures))
+            for name, ours_value in ours.items():
+                label = f"{job.mode}, {job.imt} {job.component}, {name}"
+                worst = max(worst, _line(label, theirs[name], ours_value))
         print("\n" + _heading(f"pelicun {pelicun}: share of failures", "pelicun"))
-        for what, share, own in damage_runs(given.python, folder):
-            worst = max(worst, _line(what, share, own))
+        for label, share, ours_value in damage_runs(options.python, folder):
+            worst = max(worst, _line(label, share, ours_value))
     print(f"\nlargest difference {worst:.2%}, allowed {ALLOWED:.0%}")
     sys.exit(worst > ALLOWED)
 
 
-def _heading(what: str, tool: str) -> str:
-    return f"{what:46}{tool:>11}{'rbfrag':>11}{'differ by':>11}"
+def _heading(label: str, tool: str) -> str:
+    return f"{label:46}{tool:>11}{'rbfrag':>11}{'differ by':>11}"
 
 
-def _line(what: str, theirs: float, own: float) -> float:
-    differs = abs(theirs - own) / own
-    print(f"{what:46}{theirs:11.4e}{own:11.4e}{differs:11.2%}", flush=True)
+def _line(label: str, theirs: float, ours_value: float) -> float:
+    differs = abs(theirs - ours_value) / ours_value
+    print(f"{label:46}{theirs:11.4e}{ours_value:11.4e}{differs:11.2%}", flush=True)
     return differs
 
 

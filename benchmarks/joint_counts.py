@@ -1,8 +1,7 @@
 """Speed and accuracy of joint failures:  python -m benchmarks.joint_counts [--write]
 
 Rates of any failure at a site against many more points; numbers of failures in events by rows of
-like blocks, by the law of many blocks against draws of each, and by shifted models. Times are
-processor times, the best of some.
+identical blocks. Times are processor times, the best of some.
 """
 
 from __future__ import annotations
@@ -10,7 +9,6 @@ from __future__ import annotations
 import resource
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from typing import Any
 from unittest.mock import patch
 
@@ -19,19 +17,16 @@ from scipy.special import ndtr
 
 from benchmarks.page import markdown, parser, report
 from rbfrag.fragility.joint import Placement
-from rbfrag.fragility.joint_sampling import JointSampler
-from rbfrag.fragility.large_counts import LargeCounts
-from rbfrag.hazards import joint_thresholds
+from rbfrag.hazards import joint_rate
 from rbfrag.hazards.event_counts import EventYears, count_part
-from rbfrag.hazards.joint_thresholds import joint_rates
+from rbfrag.hazards.joint_rate import joint_rates
 from rbfrag.solver.results import FloatArray
 from tests.fragility.portfolio_draws import LAW, SHARED
 from tests.hazards.test_event_counts import events, portfolio
 
 U = np.arange(-4.6, 1.4, 0.0112)
 MASS = 0.0112 * 2.5e-3 * np.exp(-2.5 * U)
-MANY_POINTS, SITES_TRIED, DRAWS = 1 << 17, 10, 2000
-LARGE = ((10_000, 1000, 0.1), (10_000, 1000, 0.5), (3000, 30, 0.1), (1500, 300, 0.1))
+MANY_POINTS, SITES_TRIED = 1 << 17, 10
 
 
 def blocks(n: int, sites: int, level: float, seed: int) -> tuple[Placement, FloatArray]:
@@ -68,10 +63,10 @@ def rates() -> list[list[str]]:
                 names = dict.fromkeys(
                     ("MOST_POINTS", "FEWEST_POINTS"), MANY_POINTS // max(1, n // 25)
                 )
-                with patch.multiple(joint_thresholds, **names):
+                with patch.multiple(joint_rate, **names):
                     exact = joint_rates(p, MASS, where, LAW, seed=5).rate[0, 0]
-                own = joint_rates(p, MASS, where, LAW).rate[0, 0]
-                errors.append(own / exact - 1.0)
+                rate = joint_rates(p, MASS, where, LAW).rate[0, 0]
+                errors.append(rate / exact - 1.0)
         cells = ("exact", "exact") if n <= 2 else ("", "")
         if errors:
             e = np.abs(errors)
@@ -90,59 +85,12 @@ def like_blocks() -> list[list[str]]:
     return [["100,000", "1,000", "100", f"{took:.2f} s", f"{memory:.0f} MB"]]
 
 
-def large() -> list[list[str]]:
-    """Return the law of the number of failures of many blocks beside that of draws of each."""
-    rows = []
-    for n, sites, level in LARGE:
-        where, away = blocks(n, sites, level, 0)
-        a, count, one = away / 0.45, np.ones(n, dtype=np.int64), np.ones(n)
-        law = LargeCounts(LAW, where, count)
-
-        def numbers(draws: int, law: Any = law, a: Any = a, one: Any = one) -> FloatArray:
-            latent = law.latent(draws, np.random.default_rng(1))
-            return np.asarray(law.sums(a, 0.0, latent, [(one, one)])[0][0])
-
-        took, many = seconds(lambda f=numbers: f(100)), numbers(20_000)
-        start, random = time.process_time(), np.random.default_rng(2)
-        sampler = JointSampler(LAW, where)
-        each = [(sampler.normals(100, random) <= a).sum(axis=1) for _ in range(DRAWS // 100)]
-        full, drawn = time.process_time() - start, np.concatenate(each)
-        ends = (f"{a:.0f} ({b:.0f})" for a, b in zip(
-            np.quantile(many, (0.05, 0.5, 0.95, 0.99)), np.quantile(drawn, (0.05, 0.5, 0.95, 0.99)),
-            strict=True,
-        ))  # fmt: skip
-        rows.append([
-            f"{n:,}", str(sites), f"{drawn.mean():.0f}", f"{many.std() / drawn.std():.3f}", *ends,
-            f"{1e3 * took:.1f} ms", f"{full:.1f} s",
-        ])  # fmt: skip
-    return rows
-
-
-def shifts() -> list[list[str]]:
-    """Return what twelve shifted models add to the samples of events."""
-    random = np.random.default_rng(1)
-    shaking = events(0.3 * np.exp(0.5 * random.normal(size=(500, 12))))
-    y, site = random.uniform(0.15, 0.6, 120), [f"s{i % 12}" for i in range(120)]
-    whole = portfolio(shaking, SHARED, "single", y=y, site=site)
-    part = EventYears(0, whole, shaking, np.arange(1.0, 40.0), np.empty(0), 100, 0)
-    times = []
-    for number in (0, 12):
-        with_shifted = part._replace(shifted=tuple(replace(whole) for _ in range(number)))
-        times.append(seconds(lambda p=with_shifted: count_part(p), 2))
-    return [["500", "120", "100", *(f"{one:.2f} s" for one in times)]]
-
-
 def main(arguments: Sequence[str] | None = None) -> None:
     """Measure and print."""
     chosen = parser(__doc__).parse_args(arguments)
     tables = {
         "like-blocks": (["like blocks", "events", "samples", "time", "peak memory"], like_blocks),
         "joint-rates": (["blocks", "time of a site", "error, rms", "greatest"], rates),
-        "large-counts": (
-            ["blocks", "sites", "mean", "sd over drawn", "5 % (drawn)", "50 %", "95 %", "99 %",
-             "100 samples", f"{DRAWS} draws of each"], large,
-        ),
-        "shifted-counts": (["events", "blocks", "samples", "alone", "and 12 shifted"], shifts),
     }  # fmt: skip
     for name, (head, measured) in tables.items():
         report(name, markdown((head, measured())), write=chosen.write)

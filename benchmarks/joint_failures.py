@@ -25,7 +25,7 @@ from rbfrag.fragility.dependence import Dependence
 from rbfrag.fragility.fit.data import FitData, fit_data, read_source
 from rbfrag.fragility.fit.dependence import PairTables, estimate_dependence, observed_blocks
 from rbfrag.fragility.fit.likelihood import most_likely
-from rbfrag.fragility.fit.outcomes import OutcomeRows, outcome_rows, parameter_names
+from rbfrag.fragility.fit.maximum_likelihood import OutcomeRows, outcome_rows, parameter_names
 from rbfrag.fragility.joint import Placement, count_moments
 from rbfrag.fragility.measures import TERMS
 from rbfrag.fragility.methods import method_named
@@ -43,7 +43,7 @@ PARAMETERS = tuple(field.name for field in fields(Dependence))
 FOLDS = 16
 RANGES = {"mixed": (0.005, 0.995), "rare": (0.002, 0.15)}
 """P of the blocks of a portfolio."""
-PLACES = ("one site, one side", "one site", "several sites")
+PLACEMENTS = ("one site, one side", "one site", "several sites")
 PORTFOLIOS, FEWEST = 1500, 100
 
 
@@ -101,10 +101,10 @@ def laws_of_folds(blocks: pd.DataFrame) -> dict[str, Dependence]:
     fold = {label: i % FOLDS for i, label in enumerate(by_size)}
     number = np.array([fold[label] for label in tables.earthquakes])
     laws = [
-        tables.likeliest((number != one).astype(np.float64), start=everything)
-        for one in range(FOLDS)
+        tables.likeliest((number != fold_number).astype(np.float64), start=everything)
+        for fold_number in range(FOLDS)
     ]
-    return {label: laws[one] for label, one in fold.items()}
+    return {label: laws[fold_number] for label, fold_number in fold.items()}
 
 
 def placement_of(blocks: pd.DataFrame) -> Placement:
@@ -114,22 +114,24 @@ def placement_of(blocks: pd.DataFrame) -> Placement:
     return Placement.of(ln_p, ln_y, site=site, component=component, polarity=blocks["polarity"])
 
 
-def portfolio(own: pd.DataFrame, place: str, generator: np.random.Generator) -> pd.DataFrame | None:
+def portfolio(
+    blocks: pd.DataFrame, place: str, generator: np.random.Generator
+) -> pd.DataFrame | None:
     """Return 10 to 50 blocks of one earthquake: of one component and side, a site, or 4 to 10
     components; None where there are too few."""
     label = "site" if place == "one site" else "component"
-    labels = own[label].unique()
+    labels = blocks[label].unique()
     if place == "several sites":
         if labels.size < 4:
             return None
         number = int(generator.integers(4, min(10, labels.size) + 1))
-        own = own[own[label].isin(generator.choice(labels, number, replace=False))]
+        blocks = blocks[blocks[label].isin(generator.choice(labels, number, replace=False))]
     else:
-        own = own[own[label] == generator.choice(labels)]
+        blocks = blocks[blocks[label] == generator.choice(labels)]
         if place == "one site, one side":
-            own = own[own["polarity"] == generator.choice((-1, 1))]
+            blocks = blocks[blocks["polarity"] == generator.choice((-1, 1))]
     number = int(generator.integers(10, 51))
-    return None if len(own) < number else own.sample(number, random_state=generator)
+    return None if len(blocks) < number else blocks.sample(number, random_state=generator)
 
 
 @dataclass(frozen=True, eq=False)
@@ -158,10 +160,10 @@ class Line:
     def gain(self) -> tuple[float, float, float]:
         """Return by how much the copula's log score of any failure is below that of independence,
         with its 90 % interval by earthquakes."""
-        some = self.count > 0
+        any_portfolio = self.count > 0
         clipped = (np.clip(p, 1e-4, 1.0 - 1e-4) for p in self.any_by)
-        law, alone = (np.where(some, np.log(p), np.log1p(-p)) for p in clipped)
-        return (float((law - alone).mean()), *self._ends(law - alone, np.ones(some.size)))
+        law, alone = (np.where(any_portfolio, np.log(p), np.log1p(-p)) for p in clipped)
+        return (float((law - alone).mean()), *self._ends(law - alone, np.ones(any_portfolio.size)))
 
     def _ends(self, top: FloatArray, bottom: FloatArray) -> tuple[float, float]:
         number = np.unique(self.event, return_inverse=True)[1]
@@ -176,19 +178,19 @@ def line(study: Study, place: str, kind: str) -> Line | None:
     """Draw portfolios of one kind and predict them."""
     low, high = RANGES[kind]
     p = study.blocks["probability"]
-    usable = [(law, own) for law, own in _by_earthquake(study, (p > low) & (p < high))]
+    earthquakes = [(law, blocks) for law, blocks in _by_earthquake(study, (p > low) & (p < high))]
     generator, rows = np.random.default_rng(0), []
-    for _ in range(10 * PORTFOLIOS if usable else 0):
-        number = int(generator.integers(len(usable)))
-        law, own = usable[number]
-        some = portfolio(own, place, generator)
-        if some is None:
+    for _ in range(10 * PORTFOLIOS if earthquakes else 0):
+        number = int(generator.integers(len(earthquakes)))
+        law, blocks = earthquakes[number]
+        chosen = portfolio(blocks, place, generator)
+        if chosen is None:
             continue
-        each = some["probability"].to_numpy()
-        mean, variance = count_moments(each, placement_of(some), law)
+        probabilities = chosen["probability"].to_numpy()
+        mean, variance = count_moments(probabilities, placement_of(chosen), law)
         rows.append((
-            number, float(some["failed"].sum()), mean, variance,
-            any_of(each, mean, variance), 1.0 - np.prod(1.0 - each),
+            number, float(chosen["failed"].sum()), mean, variance,
+            any_of(probabilities, mean, variance), 1.0 - np.prod(1.0 - probabilities),
         ))  # fmt: skip
         if len(rows) == PORTFOLIOS:
             break
@@ -198,9 +200,9 @@ def line(study: Study, place: str, kind: str) -> Line | None:
     return Line(event.astype(np.intp), *columns[:3], (columns[3], columns[4]))
 
 
-def any_of(each: FloatArray, mean: float, variance: float) -> float:
+def any_of(probabilities: FloatArray, mean: float, variance: float) -> float:
     """Return P of any failure by the beta-binomial law of a mean and a variance, or a binomial."""
-    n, share = each.size, mean / each.size
+    n, share = probabilities.size, mean / probabilities.size
     alone = n * share * (1.0 - share)
     rho = (variance / alone - 1.0) / (n - 1.0) if n > 1 and alone > 0.0 else 0.0
     if rho > 1e-9:
@@ -209,24 +211,24 @@ def any_of(each: FloatArray, mean: float, variance: float) -> float:
     else:
         p = 1.0 - variance / mean
         none = (1.0 - p) ** (mean / p) if p > 0.0 else (1.0 - share) ** n
-    return float(np.clip(1.0 - none, each.max(), min(mean, 1.0)))
+    return float(np.clip(1.0 - none, probabilities.max(), min(mean, 1.0)))
 
 
 def _by_earthquake(study: Study, chosen: pd.Series) -> Iterator[tuple[Dependence, pd.DataFrame]]:
-    for label, own in study.blocks[chosen].groupby("earthquake"):
-        yield study.laws[str(label)], own
+    for label, blocks in study.blocks[chosen].groupby("earthquake"):
+        yield study.laws[str(label)], blocks
 
 
 def parameter_row(study: Study) -> list[str]:
     """Return the estimates with their errors."""
-    found = estimate_dependence(**study.blocks.to_dict("series"))
-    cells = [f"{getattr(found.dependence, n):.2f} ± {found.errors[n]:.2f}" for n in PARAMETERS]
+    estimate = estimate_dependence(**study.blocks.to_dict("series"))
+    cells = [f"{estimate[n]:.2f} ± {estimate['errors'][n]:.2f}" for n in PARAMETERS]
     return [study.name, *cells]
 
 
-def cell(found: tuple[float, float, float], sign: str = "") -> str:
+def cell(estimate: tuple[float, float, float], sign: str = "") -> str:
     """Return a number with its interval."""
-    value, low, high = (f"{one:{sign}.2f}" for one in found)
+    value, low, high = (f"{value:{sign}.2f}" for value in estimate)
     return f"{value} ({low} to {high})"
 
 
@@ -239,13 +241,15 @@ def main(arguments: Sequence[str] | None = None) -> None:
     for name in chosen.models:
         study = Study.of(chosen.db, name)
         parameters.append(parameter_row(study))
-        mixed, rare = ([line(study, place, kind) for place in PLACES] for kind in RANGES)
-        counts.append([name, *("" if one is None else cell(one.ratio()) for one in mixed)])
-        gains.append([name, *("" if one is None else cell(one.gain(), "+") for one in rare)])
+        mixed, rare = ([line(study, place, kind) for place in PLACEMENTS] for kind in RANGES)
+        counts.append([name, *("" if result is None else cell(result.ratio()) for result in mixed)])
+        gains.append(
+            [name, *("" if result is None else cell(result.gain(), "+") for result in rare)]
+        )
     tables = {
         "parameters": (["model", *PARAMETERS], parameters),
-        "counts": (["model", *PLACES], counts),
-        "any": (["model", *PLACES], gains),
+        "counts": (["model", *PLACEMENTS], counts),
+        "any": (["model", *PLACEMENTS], gains),
     }
     for name, table in tables.items():
         text = markdown(table)

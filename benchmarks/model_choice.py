@@ -20,20 +20,67 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.held_out import STEP, folds
-from benchmarks.model_acceptance import Mark, acceptance_table
 from benchmarks.page import ROOT, markdown, parser, write_table
 from rbfrag.db.engine import opened_database
 from rbfrag.db.location import REFERENCE
-from rbfrag.fragility.fit.clusters import cr3, jackknife_steps
 from rbfrag.fragility.fit.data import REAL_KR, Y0_OVER_PGV, FitSource, fit_data, read_source
 from rbfrag.fragility.fit.fitting import fit_source
 from rbfrag.fragility.fit.likelihood import Binomial, maximise, most_likely
-from rbfrag.fragility.fit.outcomes import outcome_rows, parameter_names
-from rbfrag.fragility.fit.scores import CLIP, calibration
+from rbfrag.fragility.fit.maximum_likelihood import outcome_rows, parameter_names
+from rbfrag.fragility.fit.result import CLIP, calibration, cr3, jackknife_steps
 from rbfrag.fragility.measures import TERMS
 from rbfrag.fragility.method import LOGIT
 from rbfrag.fragility.methods import method_named
 from rbfrag.vocabulary.quantities import word_of
+
+
+@dataclass(frozen=True)
+class Mark:
+    """One number that is aimed at.
+
+    Args:
+        model: whose number it is.
+        words: what it is.
+        low: least value that is accepted.
+        high: greatest value that is accepted.
+        value: what is reached.
+        also: a further condition, in words, with whether it holds.
+    """
+
+    model: str
+    words: str
+    low: float
+    high: float
+    value: float
+    also: tuple[str, bool] | None = None
+
+    @property
+    def aim(self) -> str:
+        """The range in words."""
+        if math.isinf(self.low):
+            words = f"≤ {self.high:g}"
+        elif math.isinf(self.high):
+            words = f"≥ {self.low:g}"
+        else:
+            words = f"{self.low:g} to {self.high:g}"
+        return words if self.also is None else f"{words}, {self.also[0]}"
+
+    @property
+    def reached(self) -> bool:
+        """Whether it is."""
+        return self.low <= self.value <= self.high and (self.also is None or self.also[1])
+
+    @property
+    def cell(self) -> str:
+        """The value with whether it is reached."""
+        return f"{self.value:.4g}" if self.reached else f"**{self.value:.4g}, missed**"
+
+
+def acceptance_table(marks: Sequence[Mark]) -> str:
+    """Return the table of the page."""
+    head = ["model", "what", "aim", "reached"]
+    return markdown((head, [[m.model, m.words, m.aim, m.cell] for m in marks]))
+
 
 FloatArray = NDArray[np.float64]
 Labels = NDArray[np.intp]
@@ -190,8 +237,8 @@ class Predicted:
         """Calibration intercept of each class of magnitude, above 0 where P is too low."""
         parts = [self.of_magnitude(low, high) for low, high in pairwise(MAGNITUDES)]
         return [
-            calibration(one.p, one.failed, np.ones(one.p.size, dtype=np.bool_)).intercept
-            for one in parts
+            calibration(part.p, part.failed, np.ones(part.p.size, dtype=np.bool_)).intercept
+            for part in parts
         ]
 
     @property
@@ -238,8 +285,8 @@ def table_of_shares(failed: FloatArray, event: Labels, cell: Labels) -> FloatArr
     place = event * shape[1] + cell
     n = np.bincount(place, minlength=shape[0] * shape[1]).reshape(shape)
     failures = np.bincount(place, failed, minlength=shape[0] * shape[1]).reshape(shape)
-    others, of_others = n.sum(axis=0) - n, failures.sum(axis=0) - failures
-    return np.asarray(((of_others + 0.5) / (others + 1.0)).ravel()[place])
+    of_other_events, of_others = n.sum(axis=0) - n, failures.sum(axis=0) - failures
+    return np.asarray(((of_others + 0.5) / (of_other_events + 1.0)).ravel()[place])
 
 
 def predicted(source: FitSource, aims: Aims) -> Predicted:
@@ -253,38 +300,39 @@ def predicted(source: FitSource, aims: Aims) -> Predicted:
         rows = outcome_rows(data, method, term, parameter_names(method, term))
         best, fold = most_likely(rows.data), folds(data.event)[rows.place // data.failed.shape[1]]
         grid = np.zeros(rows.bounded.shape)
-        for own in (fold == number for number in range(fold.max() + 1)):
-            b = maximise(rows.data.only(~own), best, tolerance=1e-9)[0]
-            grid.flat[rows.place[own]] = rows.data.only(own).probability(b)
+        for in_fold in (fold == number for number in range(fold.max() + 1)):
+            b = maximise(rows.data.only(~in_fold), best, tolerance=1e-9)[0]
+            grid.flat[rows.place[in_fold]] = rows.data.only(in_fold).probability(b)
     else:
-        fitted = fit_source(source, term, method, kind=aims.kind, shared=False)
+        fitted = fit_source(source, term, method, kind=aims.kind)
         data, grid = fitted.data, fitted.result.held_out
     judged = data.judged
-    known = judged.is_known
-    event = np.broadcast_to(data.event[:, None], known.shape)[known]
-    failed = judged.failed[known]
+    is_known = judged.is_known
+    event = np.broadcast_to(data.event[:, None], is_known.shape)[is_known]
+    failed = judged.failed[is_known]
     of_motions = source.table.measure("magnitude")[data.combination]
-    magnitude = np.broadcast_to(of_motions[:, None], known.shape)[known]
+    magnitude = np.broadcast_to(of_motions[:, None], is_known.shape)[is_known]
     if not {"kr", "p2"} <= set(data.blocks):
-        return Predicted(grid[known], failed, event, magnitude=magnitude)
-    kr, p2 = (data.grid(name)[known] for name in ("kr", "p2"))
-    ratio = (data.grid("y_m_s") / data.grid("pgv_m_s"))[known]
+        return Predicted(grid[is_known], failed, event, magnitude=magnitude)
+    kr, p2 = (data.grid(name)[is_known] for name in ("kr", "p2"))
+    ratio = (data.grid("y_m_s") / data.grid("pgv_m_s"))[is_known]
     strength = np.rint(np.log(ratio / Y0_OVER_PGV[0]) / STEP).astype(np.intp)
     size = np.unique(p2, return_inverse=True)[1].astype(np.intp)
     shares = table_of_shares(failed, event, size * (int(strength.max()) + 1) + strength)
-    return Predicted(grid[known], failed, event, kr, p2, shares, magnitude)
+    return Predicted(grid[is_known], failed, event, kr, p2, shares, magnitude)
 
 
-def score_table(found: Mapping[str, Predicted]) -> str:
+def score_table(predictions_by_model: Mapping[str, Predicted]) -> str:
     """Return the scores of models whose blocks are known by k_r, best first."""
     cells = []
-    for name, one in sorted(found.items(), key=lambda item: item[1].loss):
-        real, strong = one.kr_from(REAL_KR), one.kr_from(STRONG_KR)
+    for name, prediction in sorted(predictions_by_model.items(), key=lambda item: item[1].loss):
+        real, strong = prediction.kr_from(REAL_KR), prediction.kr_from(STRONG_KR)
         assert real.shares is not None
         skill = 1.0 - real.loss / log_losses(real.shares, real.failed).mean()
         cells.append([
             f"`{name}`", measures_cell(name),
-            loss_cell(one), loss_cell(real), f"{skill:+.2f}", _slope(real), f"{strong.ratio:.2f}",
+            loss_cell(prediction), loss_cell(real), f"{skill:+.2f}", _slope(real),
+            f"{strong.ratio:.2f}",
         ])  # fmt: skip
     head = [
         "model", "reads", "log loss, $k_r$ ≥ .02", "log loss, $k_r$ ≥ .05", "skill", "slope",
@@ -304,31 +352,41 @@ def loss_cell(blocks: Predicted) -> str:
     return f"{mean:.4f} ± {error:.4f}"
 
 
-def class_table(found: Mapping[str, Predicted], by: str = "kr") -> str:
+def class_table(predictions_by_model: Mapping[str, Predicted], by: str = "kr") -> str:
     """Return the slope of each class of k_r or of `magnitude`, or of each size `p2`.
 
     By magnitude it is that of blocks of `REAL_KR` and more, with predicted over observed failures.
     """
-    models = found.values()
+    models = predictions_by_model.values()
     classes: dict[str, list[Predicted]] = {}
     if by == "p2":
-        for p2 in np.unique(np.concatenate([one.p2 for one in models if one.p2 is not None]))[::-1]:
-            classes[f"$p^2$ = {p2:g} 1/s²"] = [one.of_size(p2) for one in models]
+        for p2 in np.unique(
+            np.concatenate([prediction.p2 for prediction in models if prediction.p2 is not None])
+        )[::-1]:
+            classes[f"$p^2$ = {p2:g} 1/s²"] = [prediction.of_size(p2) for prediction in models]
     elif by == "magnitude":
         for words, low, high in magnitude_classes():
-            of_class = [one.of_magnitude(low, high) for one in models]
-            classes[words] = [one.kr_from(REAL_KR) for one in of_class]
+            of_class = [prediction.of_magnitude(low, high) for prediction in models]
+            classes[words] = [prediction.kr_from(REAL_KR) for prediction in of_class]
     else:
         for low, high in pairwise(KR_CLASSES):
             words = f"$k_r$ {low:g} to {high:g}"
-            classes[words] = [one.kr_from(low, high) for one in models]
+            classes[words] = [prediction.kr_from(low, high) for prediction in models]
     cells = []
-    for words, some in classes.items():
-        ratios = [f"; {one.ratio:.2f}" if by == "magnitude" else "" for one in some]
+    for words, predictions in classes.items():
+        ratios = [
+            f"; {prediction.ratio:.2f}" if by == "magnitude" else "" for prediction in predictions
+        ]
         cells.append(
-            [words, *(_slope(one) + ratio for one, ratio in zip(some, ratios, strict=True))]
+            [
+                words,
+                *(
+                    _slope(prediction) + ratio
+                    for prediction, ratio in zip(predictions, ratios, strict=True)
+                ),
+            ]
         )
-    return markdown((["slope", *(f"`{name}`" for name in found)], cells))
+    return markdown((["slope", *(f"`{name}`" for name in predictions_by_model)], cells))
 
 
 def magnitude_classes() -> Iterator[tuple[str, float, float]]:
@@ -345,35 +403,39 @@ def _slope(blocks: Predicted) -> str:
     return f"{slope:.2f} ± {error:.2f}" if math.isfinite(slope) else "–"
 
 
-def marks(name: str, aims: Aims, found: Predicted) -> Iterator[Mark]:
+def marks(name: str, aims: Aims, predictions: Predicted) -> Iterator[Mark]:
     """Yield what is aimed at, with what is reached."""
-    of_kr = found.kr is not None
+    of_kr = predictions.kr is not None
 
-    def loss(words: str, asked: float, one: Predicted) -> Mark:
-        return Mark(name, words, asked - LOSS_WITHIN, asked + LOSS_WITHIN, round(one.loss, 4))
+    def loss(words: str, aim: float, prediction: Predicted) -> Mark:
+        return Mark(name, words, aim - LOSS_WITHIN, aim + LOSS_WITHIN, round(prediction.loss, 4))
 
-    def slope(words: str, asked: float, one: Predicted) -> Mark:
-        reached = round(one.slope[0], 2)
-        return Mark(name, words, asked - SLOPE_WITHIN, asked + SLOPE_WITHIN, reached)
+    def slope(words: str, aim: float, prediction: Predicted) -> Mark:
+        reached = round(prediction.slope[0], 2)
+        return Mark(name, words, aim - SLOPE_WITHIN, aim + SLOPE_WITHIN, reached)
 
     if aims.loss is not None:
-        yield loss("log loss, k_r ≥ 0.02" if of_kr else "log loss", aims.loss, found)
+        yield loss("log loss, k_r ≥ 0.02" if of_kr else "log loss", aims.loss, predictions)
     if aims.loss_kr05 is not None:
-        yield loss("log loss, k_r ≥ 0.05", aims.loss_kr05, found.kr_from(REAL_KR))
+        yield loss("log loss, k_r ≥ 0.05", aims.loss_kr05, predictions.kr_from(REAL_KR))
     if aims.slope_kr05 is not None:
-        yield slope("slope, k_r ≥ 0.05", aims.slope_kr05, found.kr_from(REAL_KR))
+        yield slope("slope, k_r ≥ 0.05", aims.slope_kr05, predictions.kr_from(REAL_KR))
     if aims.strong is not None:
         words = f"predicted over observed failures, k_r ≥ {STRONG_KR:g}"
-        yield Mark(name, words, *aims.strong, round(found.kr_from(STRONG_KR).ratio, 2))
-    for asked, (low, high) in zip(aims.kr_slopes, pairwise(KR_CLASSES), strict=False):
-        yield slope(f"slope, k_r {low:g} to {high:g}", asked, found.kr_from(low, high))
-    if aims.size_slopes is not None and found.p2 is not None:
-        of_sizes = [found.only(found.p2 == p2).slope[0] for p2 in np.unique(found.p2)]
+        yield Mark(name, words, *aims.strong, round(predictions.kr_from(STRONG_KR).ratio, 2))
+    for aim, (low, high) in zip(aims.kr_slopes, pairwise(KR_CLASSES), strict=False):
+        yield slope(f"slope, k_r {low:g} to {high:g}", aim, predictions.kr_from(low, high))
+    if aims.size_slopes is not None and predictions.p2 is not None:
+        of_sizes = [
+            predictions.only(predictions.p2 == p2).slope[0] for p2 in np.unique(predictions.p2)
+        ]
         low, high = aims.size_slopes[0] - SLOPE_WITHIN, aims.size_slopes[1] + SLOPE_WITHIN
         for words, value in (("least", min(of_sizes)), ("greatest", max(of_sizes))):
             yield Mark(name, f"{words} slope of a size", low, high, round(value, 2))
     if aims.intercept is not None:
-        worst = max((one for one in found.intercepts if math.isfinite(one)), key=abs)
+        worst = max(
+            (intercept for intercept in predictions.intercepts if math.isfinite(intercept)), key=abs
+        )
         words = "farthest intercept of a class of magnitude"
         yield Mark(name, words, -aims.intercept, aims.intercept, round(worst, 2))
 
@@ -401,14 +463,16 @@ def main(arguments: Sequence[str] | None = None) -> None:
             source = read_source(connection, block, kind=kind)
             if not source.table.p2.size:
                 continue
-            found = {name: predicted(source, aims) for name, aims in models.items()}
+            predictions_by_model = {name: predicted(source, aims) for name, aims in models.items()}
             reached = [
-                mark for name, one in found.items() for mark in marks(name, models[name], one)
+                mark
+                for name, prediction in predictions_by_model.items()
+                for mark in marks(name, models[name], prediction)
             ]
             missed = missed or not all(mark.reached for mark in reached)
             tables = {"aims": acceptance_table(reached)}
             if not chosen.aims:
-                tables |= tables_of(found)
+                tables |= tables_of(predictions_by_model)
             for name, table in tables.items():
                 print(f"## {kind}: {name}\n\n{table}\n", flush=True)
                 if chosen.write:
@@ -417,15 +481,19 @@ def main(arguments: Sequence[str] | None = None) -> None:
         raise SystemExit(1)
 
 
-def tables_of(found: Mapping[str, Predicted]) -> dict[str, str]:
+def tables_of(predictions_by_model: Mapping[str, Predicted]) -> dict[str, str]:
     """Return the tables of models of one kind, if its blocks are known by k_r."""
-    if any(one.kr is None for one in found.values()):
+    if any(prediction.kr is None for prediction in predictions_by_model.values()):
         return {}
-    shown = {name: one for name, one in found.items() if MODELS[name].loss is not None}
+    shown = {
+        name: prediction
+        for name, prediction in predictions_by_model.items()
+        if MODELS[name].loss is not None
+    }
     if not shown:
-        return {"scores": score_table(found)}
+        return {"scores": score_table(predictions_by_model)}
     return {
-        "scores": score_table(found),
+        "scores": score_table(predictions_by_model),
         "strengths": class_table(shown),
         "sizes": class_table(shown, "p2"),
         "magnitudes": class_table(shown, "magnitude"),

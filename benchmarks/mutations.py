@@ -26,21 +26,21 @@ class Mutation(NamedTuple):
     """One mistake.
 
     Args:
-        what: in words.
+        mistake: in words.
         file: below `rbfrag/solver`.
         old: text that stands there once.
         new: what stands there instead.
         tests: file of tests that should notice, below `tests`.
     """
 
-    what: str
+    mistake: str
     file: str
     old: str
     new: str
     tests: str
 
 
-STEP, RUN = "integrator/step.py", "integrator/toppling_kernel.py"
+STEP, RUN = "integrator/taylor.py", "integrator/toppling_kernel.py"
 ERRORS = "solver/integrator/test_step_errors.py"
 TOPPLING = "solver/integrator/test_toppling_kernel.py"
 MUTATIONS = (
@@ -102,11 +102,12 @@ def main(arguments: Sequence[str] | None = None) -> None:
         for name in COPIED:
             copy = shutil.copytree if (ROOT / name).is_dir() else shutil.copy
             copy(ROOT / name, place / name)
-        for tests in sorted({each.tests for each in MUTATIONS}):
+        for tests in sorted({mutation.tests for mutation in MUTATIONS}):
             if not passes(place, tests):
                 sys.exit(f"tests/{tests} fails without a mistake")
-        for each in MUTATIONS:
-            line = f"| {each.what} | `{Path(each.tests).name}` | {result_of(place, each)} |"
+        for mutation in MUTATIONS:
+            cells = (mutation.mistake, f"`{Path(mutation.tests).name}`", result_of(place, mutation))
+            line = f"| {' | '.join(cells)} |"
             print(line, flush=True)
             lines.append(line)
     text = "\n".join([*lines, "", machine_sentence()])
@@ -119,7 +120,7 @@ def result_of(place: Path, mutation: Mutation) -> str:
     file = place / "rbfrag" / "solver" / mutation.file
     text = file.read_text(encoding="utf-8")
     if text.count(mutation.old) != 1:
-        sys.exit(f"{mutation.what}: {mutation.old!r} stands {text.count(mutation.old)} times")
+        sys.exit(f"{mutation.mistake}: {mutation.old!r} stands {text.count(mutation.old)} times")
     file.write_text(text.replace(mutation.old, mutation.new), encoding="utf-8")
     try:
         return "not noticed" if passes(place, mutation.tests) else "noticed"
@@ -131,13 +132,13 @@ def passes(place: Path, tests: str) -> bool:
     """Return whether a file of tests passes in a copy of the project."""
     command = [sys.executable, "-m", "pytest", "-q", "-x", f"tests/{tests}"]
     environment = {**os.environ, "PYTHONPATH": str(place)}
-    done = subprocess.run(
+    process = subprocess.run(
         command, cwd=place, env=environment, capture_output=True, check=False, text=True
     )
     # 1: a test failed; everything else is a mistake of another sort
-    if done.returncode not in (0, 1):
-        sys.exit(done.stdout[-2000:] + done.stderr[-2000:])
-    return done.returncode == 0
+    if process.returncode not in (0, 1):
+        sys.exit(process.stdout[-2000:] + process.stderr[-2000:])
+    return process.returncode == 0
 
 
 if __name__ == "__main__":

@@ -26,30 +26,30 @@ def used() -> dict[str, float]:
     """Return processor times [s] and peak memory [MB] of this process and of its workers."""
     # counted in kB, on macOS in bytes
     unit = 1e6 if sys.platform == "darwin" else 1e3
-    own, workers = (
-        resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)
+    own_usage, workers = (
+        resource.getrusage(process) for process in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)
     )
     return {
-        "writer_s": own.ru_utime + own.ru_stime,
+        "writer_s": own_usage.ru_utime + own_usage.ru_stime,
         "workers_s": workers.ru_utime + workers.ru_stime,
-        "writer_mb": own.ru_maxrss / unit,
+        "writer_mb": own_usage.ru_maxrss / unit,
         "worker_mb": workers.ru_maxrss / unit,
     }
 
 
-def run_campaign(database: Path, **asked: Any) -> dict[str, Any]:
+def run_campaign(database: Path, **settings: Any) -> dict[str, Any]:
     """Run one campaign and return its summary with what it used."""
-    done = subprocess.run(
-        [sys.executable, "-m", "benchmarks.one_campaign", str(database), json.dumps(asked)],
+    finished = subprocess.run(
+        [sys.executable, "-m", "benchmarks.one_campaign", str(database), json.dumps(settings)],
         env={**os.environ, "PYTHONPATH": str(ROOT)},
         cwd=ROOT,
         capture_output=True,
         text=True,
     )
-    if done.returncode:
-        raise SystemExit(f"a campaign failed: {done.stderr}")
-    found: dict[str, Any] = json.loads(done.stdout.splitlines()[-1])
-    return found
+    if finished.returncode:
+        raise SystemExit(f"a campaign failed: {finished.stderr}")
+    summary: dict[str, Any] = json.loads(finished.stdout.splitlines()[-1])
+    return summary
 
 
 if __name__ == "__main__":

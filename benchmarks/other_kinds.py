@@ -16,25 +16,28 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
+from os import PathLike
 from pathlib import Path
-from typing import Unpack
+from typing import Any, Unpack
 
 import numpy as np
 from numpy.typing import NDArray
 from sqlalchemy import Connection
 
-from benchmarks.other_kinds_figure import plot_other_kinds
 from benchmarks.page import ROOT, markdown, write_table
 from rbfrag.db.engine import opened_database
 from rbfrag.db.location import REFERENCE
 from rbfrag.db.model_file import ModelRow, read_models
 from rbfrag.db.rows import Selection
-from rbfrag.fragility.fit.critical import probabilities
 from rbfrag.fragility.fit.data import FitData, read_source
 from rbfrag.fragility.fit.fitting import Fitted, fit_source, method_of_kind
-from rbfrag.fragility.fit.scores import brier, calibration, log_loss
+from rbfrag.fragility.fit.maximum_likelihood import probabilities
+from rbfrag.fragility.fit.result import brier, calibration, log_loss
 from rbfrag.fragility.measures import TERMS
+from rbfrag.fragility.method import arrays
+from rbfrag.fragility.model import FragilityModel
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
+from rbfrag.plots.canvas import Picture, new_figure, plot_path, save_figure, written_numbers
 
 FloatArray = NDArray[np.float64]
 
@@ -48,7 +51,7 @@ def fitted(
     """Fit a model of a kind."""
     method = method_of_kind(kind, None)
     source = read_source(connection, method.block, kind=kind, **selection)
-    return fit_source(source, TERMS[term], method, kind=kind, selection=selection, shared=False)
+    return fit_source(source, TERMS[term], method, kind=kind, selection=selection)
 
 
 def as_slide(slump: FitData, sliding: Fitted, rotation_deg: float) -> FloatArray:
@@ -99,13 +102,13 @@ def class_lines(
     judged, of = data.judged, _class_values(data)[variable]
     lines = []
     for low, high in pairwise(edges):
-        here = judged.is_known & (of >= low) & (of < high)
-        if not here.any():
+        in_class = judged.is_known & (of >= low) & (of < high)
+        if not in_class.any():
             continue
-        mean = [float(each[here].mean()) for each in (p, judged.failed)]
+        mean = [float(column[in_class].mean()) for column in (p, judged.failed)]
         # where nearly all or none fail there is no slope to speak of
         decided = not 0.01 < mean[1] < 0.99
-        slope = calibration(p, judged.failed, here).slope
+        slope = calibration(p, judged.failed, in_class).slope
         text = f"{low:g} to {high:g}" if np.isfinite(high) else f"from {low:g}"
         lines.append([
             name, f"{variable} {text}", "" if decided else f"{slope:.2f}",
@@ -132,7 +135,7 @@ def tables(
     database: str, slumping: str | None, suite: str | None
 ) -> tuple[dict[str, str], tuple[Fitted, Fitted]]:
     """Return the tables of the page by name, and the fits that the figure draws."""
-    found: dict[str, str] = {}
+    tables_by_name: dict[str, str] = {}
     with opened_database(database, read_only=True) as engine, engine.connect() as c:
         slides = {term: fitted(c, "sliding", term) for term in ("pgv_pga", "pgv")}
     with opened_database(slumping or database, read_only=True) as engine, engine.connect() as c:
@@ -149,22 +152,22 @@ def tables(
     for fit in slides.values():
         for variable, edges in (*_ratio_classes(fit), ("d [m]", DISTANCES)):
             rows += class_lines(_name(fit), fit.result.held_out, fit.data, variable, edges)
-    found["sliding-classes"] = markdown((CLASS_HEADS, rows))
+    tables_by_name["sliding-classes"] = markdown((CLASS_HEADS, rows))
     rows = [scored(_name(fit), fit.result.held_out, fit.data) for fit in slumps]
     rows.append(scored("2 degrees as a slide of 2° g/p_s²", as_slide(turned, sliding, 2.0), turned))
     heads = ["held out", "log loss", "Brier", "slope", "outcomes", "undecided"]
-    found["slumping-scores"] = markdown((heads, rows))
-    found["slumping-coefficients"] = coefficient_lines(slumps)
+    tables_by_name["slumping-scores"] = markdown((heads, rows))
+    tables_by_name["slumping-coefficients"] = coefficient_lines(slumps)
     rows = [scored(_name(fit), fit.result.held_out, fit.data) for fit in confined]
-    found["confined-scores"] = markdown((heads, rows))
-    found["confined-coefficients"] = coefficient_lines(confined)
+    tables_by_name["confined-scores"] = markdown((heads, rows))
+    tables_by_name["confined-coefficients"] = coefficient_lines(confined)
     rows = []
     for fit in slumps:
         classes = (*_ratio_classes(fit), ("p_s² [1/s²]", SIZES), ("k_s", STRENGTHS))
         for variable, edges in classes:
             rows += class_lines(_name(fit), fit.result.held_out, fit.data, variable, edges)
-    found["slumping-classes"] = markdown((CLASS_HEADS, rows))
-    return found, (sliding, slumps[1])
+    tables_by_name["slumping-classes"] = markdown((CLASS_HEADS, rows))
+    return tables_by_name, (sliding, slumps[1])
 
 
 def _ratio_classes(fit: Fitted) -> tuple[tuple[str, tuple[float, ...]], ...]:
@@ -201,10 +204,12 @@ def main() -> None:
     options.add_argument("--suite", help="of the motions of these campaigns")
     options.add_argument("--write", action="store_true", help="keep tables, draw the figure")
     chosen = options.parse_args()
-    found, (sliding, slumping) = tables(chosen.database, chosen.slumping, chosen.suite)
+    tables_by_name, (sliding, slumping) = tables(chosen.database, chosen.slumping, chosen.suite)
     kinds = ("sliding", "slumping", "confined_toppling")
-    found["dependence"] = dependence_table([m for m in read_models(REFERENCE) if m.kind in kinds])
-    for name, table in found.items():
+    tables_by_name["dependence"] = dependence_table(
+        [m for m in read_models(REFERENCE) if m.kind in kinds]
+    )
+    for name, table in tables_by_name.items():
         print(name, table, sep="\n")
         if chosen.write:
             write_table(PAGE, name, table)
@@ -213,6 +218,97 @@ def main() -> None:
             sliding.report.model, sliding.data, slumping.report.model, slumping.data, FIGURE
         )
         print(Path(FIGURE).relative_to(ROOT))
+
+
+def plot_other_kinds(
+    sliding: FragilityModel, slides: FitData, slumping: FragilityModel, slumps: FitData,
+    path: str | PathLike[str],
+) -> Picture:  # fmt: skip
+    """Draw displacements over PGV²/(k_y g) against k_y/PGA, and outcomes by (1 - r)/r and z.
+
+    Args:
+        sliding: a model on PGV and PGA.
+        slides: what it was fitted to.
+        slumping: a model on PGV and PGA.
+        slumps: what it was fitted to.
+        path: file to write: .png, .pdf or .svg.
+
+    Raises:
+        InputError: a path that cannot be written.
+        MissingExtraError: matplotlib is not installed.
+    """
+    plot_path(path)
+    figure = new_figure(9.2, 4.6)
+    left_axes, right = figure.subplots(1, 2)
+    _slides(left_axes, sliding, slides)
+    _slumps(right, slumping, slumps)
+    return save_figure(figure, path)
+
+
+def _slides(axes: Any, model: FragilityModel, data: FitData) -> None:
+    v, observed = data.values, data.observed
+    r = v["ky"] / v["pga_g"]
+    size = v["pgv_m_s"] ** 2 / (v["ky"] * STANDARD_GRAVITY_M_S2)
+    share = v["displacement_m"] / size
+    rng = np.random.default_rng(0)
+    jitter = r + rng.uniform(-0.008, 0.008, r.size)
+    axes.plot(
+        jitter[observed], share[observed], ".", ms=1.6, color="#9a9a9a", alpha=0.5, rasterized=True
+    )
+    grid = np.linspace(0.01, 0.97, 120)
+    pga, pgv = 0.3, 0.3
+    line = {"ky": grid * pga, "pgv_m_s": np.full(120, pgv), "pga_g": np.full(120, pga)}
+    line["displacement_m"] = np.ones(120)
+    eta = model.form.eta(model.parameters, line, arrays())
+    sigma = np.exp(eta.log_sigma)
+    norm = pgv**2 / (line["ky"] * STANDARD_GRAVITY_M_S2)
+    axes.plot(grid, np.exp(eta.eta * sigma) / norm, color="#b2182b", lw=1.8,
+              label="median at PGA 0.3 g, PGV 0.3 m/s")  # fmt: skip
+    for side in (-1.645, 1.645):
+        axes.plot(
+            grid, np.exp((eta.eta + side) * sigma) / norm, "--", color="#b2182b", lw=1.0,
+            label="5 % and 95 %" if side > 0 else None,
+        )  # fmt: skip
+    axes.plot(grid, 0.5 * (1.0 - grid), color="black", lw=1.0, label="rectangular pulse")
+    axes.set_yscale("log")
+    axes.set_ylim(1e-5, 20.0)
+    axes.set_xlim(0.0, 1.0)
+    axes.set_xlabel(r"$k_y/\mathrm{PGA}$")
+    axes.set_ylabel(r"displacement over $\mathrm{PGV}^2/(k_y g)$")
+    axes.set_title("sliding", fontsize=10)
+    _legend(axes)
+
+
+def _slumps(axes: Any, model: FragilityModel, data: FitData) -> None:
+    b0, b1, b2, b3 = model.parameters
+    ks, r = data.grid("ks"), data.grid("ks") / data.grid("pga_g")
+    z = data.grid("p") * data.grid("pgv_m_s") / (data.grid("pga_g") * STANDARD_GRAVITY_M_S2)
+    excess = (1.0 - r) / r * ks ** (b3 / b1)
+    for fails, colour, text in ((0.0, "#7fb2d8", "comes to rest"), (1.0, "#8a8a8a", "fails")):
+        chosen = data.failed == fails
+        axes.plot(z[chosen], excess[chosen], ".", ms=1.2, color=colour, alpha=0.3, rasterized=True)
+        axes.plot([], [], "o", ms=4, color=colour, label=text)
+    grid = np.geomspace(float(z.min()), float(z.max()), 60)
+    for side in (-1.645, 0.0, 1.645):
+        axes.plot(
+            grid, np.exp((side - b0 - b2 * np.log(grid)) / b1),
+            color="#b2182b", lw=1.0 if side else 1.8, ls="--" if side else "-",
+            label={0.0: "P = 0.5", 1.645: "P = 0.05 and 0.95"}.get(side),
+        )  # fmt: skip
+    axes.set_xscale("log")
+    axes.set_yscale("log")
+    written_numbers(axes.xaxis, 1.0, 2.0, 5.0)
+    written_numbers(axes.yaxis, 1.0)
+    axes.set_xlabel(r"$z = p_s\,\mathrm{PGV}/(\mathrm{PGA}\,g)$")
+    axes.set_ylabel(rf"$(1-r)/r\cdot k_s^{{{b3 / b1:.2f}}}$, $r=k_s/\mathrm{{PGA}}$")
+    axes.set_title("slumping past recovery", fontsize=10)
+    _legend(axes)
+
+
+def _legend(axes: Any) -> None:
+    axes.legend(
+        loc="upper center", bbox_to_anchor=(0.5, -0.14), ncols=2, fontsize=8.5, frameon=False
+    )
 
 
 if __name__ == "__main__":

@@ -16,8 +16,8 @@ from typing import Any
 
 import pandas as pd
 
-from rbfrag.bench import cases
-from rbfrag.campaign.machine import machine
+from rbfrag.bench import peers
+from rbfrag.campaign.runner import machine
 
 RECORDS_VARIABLE = "RBFRAG_TEST_RECORDS"
 
@@ -29,19 +29,19 @@ RESULTS = ROOT / "benchmarks" / "results"
 
 def parser(description: str | None) -> argparse.ArgumentParser:
     """Return a parser with what every script understands."""
-    made = argparse.ArgumentParser(description=description)
-    made.add_argument(
+    options = argparse.ArgumentParser(description=description)
+    options.add_argument(
         "--records",
         help=f"accelerogram file or folder (default: {RECORDS_VARIABLE}, else as rbfrag bench)",
     )
-    made.add_argument("--out", type=Path, help="folder for CSV files")
-    made.add_argument("--write", action="store_true", help="keep the table, in docs or results")
-    return made
+    options.add_argument("--out", type=Path, help="folder for CSV files")
+    options.add_argument("--write", action="store_true", help="keep the table, in docs or results")
+    return options
 
 
-def find_records(path: str | os.PathLike[str] | None = None) -> cases.Records:
+def find_records(path: str | os.PathLike[str] | None = None) -> peers.Records:
     """Return the motions of a file or folder, else of RBFRAG_TEST_RECORDS, else of rbfrag bench."""
-    return cases.find_records(path or os.environ.get(RECORDS_VARIABLE) or None)
+    return peers.find_records(path or os.environ.get(RECORDS_VARIABLE) or None)
 
 
 def markdown(table: tuple[Sequence[str], Sequence[Sequence[str]]]) -> str:
@@ -67,15 +67,15 @@ def report(name: str, text: str, *, write: bool, page: Path | None = None) -> No
 def write_table(page: Path, name: str, text: str) -> None:
     """Put a table into its place in the page, or among the results where the page has none."""
     pattern = re.compile(rf"(<!-- {re.escape(name)} -->\n).*?(<!-- end -->)", re.S)
-    shown, places = pattern.subn(
+    shown, count = pattern.subn(
         lambda match: f"{match[1]}\n{text}\n\n{match[2]}", page.read_text(encoding="utf-8")
     )
-    if places:
+    if count:
         page.write_text(shown, encoding="utf-8")
         return
-    kept = RESULTS / page.stem / f"{name}.md"
-    kept.parent.mkdir(parents=True, exist_ok=True)
-    kept.write_text(f"{text}\n", encoding="utf-8")
+    file = RESULTS / page.stem / f"{name}.md"
+    file.parent.mkdir(parents=True, exist_ok=True)
+    file.write_text(f"{text}\n", encoding="utf-8")
 
 
 def machine_sentence() -> str:

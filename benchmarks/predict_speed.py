@@ -24,7 +24,7 @@ REPEATS = 11
 """Arrays are answered and series of calls made so often: on a virtual machine the first ones get
 their memory from the host."""
 
-KNOWN: tuple[dict[str, float], ...] = (
+QUESTIONS: tuple[dict[str, float], ...] = (
     {"pgv_m_s": 0.6},
     {"pgv_m_s": 0.6, "pga_g": 0.5},
     {"pgv_m_s": 0.6, "pga_g": 0.5, "tm_s": 0.6},
@@ -38,22 +38,22 @@ def main(arguments: Sequence[str] | None = None) -> None:
     options.add_argument("--rows", type=int, default=10_000_000)
     chosen = options.parse_args(arguments)
     cells: list[list[str]] = []
-    for known in KNOWN:
-        cells += scalar(chosen.db, known)
-        cells.append(array(chosen.db, known, chosen.rows, interval=False))
-        cells.append(array(chosen.db, known, chosen.rows, interval=True))
+    for question in QUESTIONS:
+        cells += scalar(chosen.db, question)
+        cells.append(array(chosen.db, question, chosen.rows, interval=False))
+        cells.append(array(chosen.db, question, chosen.rows, interval=True))
     head = ["what", "time", "compared with", "time", "ratio"]
     report("predict-speed", markdown((head, cells)), write=chosen.write)
 
 
-def scalar(db: str, known: dict[str, float]) -> list[list[str]]:
+def scalar(db: str, question: dict[str, float]) -> list[list[str]]:
     """Return the rows of a call with single numbers."""
-    model = suited_models({**BLOCK, **known}, db)[0]
+    model = suited_models({**BLOCK, **question}, db)[0]
     words = f"{model.name}"
     rows = []
     for name, call in (
-        ("model in hand", lambda: predict(3.0, 0.1, **known, model=model)),
-        ("database by path", lambda: predict(3.0, 0.1, **known, db=db)),
+        ("model in hand", lambda: predict(3.0, 0.1, **question, model=model)),
+        ("database by path", lambda: predict(3.0, 0.1, **question, db=db)),
     ):
         rows.append(
             [f"one block, {words}, {name}", f"{1e6 * least(call, 2000):.1f} µs", "", "", ""]
@@ -61,13 +61,13 @@ def scalar(db: str, known: dict[str, float]) -> list[list[str]]:
     return rows
 
 
-def array(db: str, known: dict[str, float], rows: int, *, interval: bool) -> list[str]:
+def array(db: str, question: dict[str, float], rows: int, *, interval: bool) -> list[str]:
     """Return the row of an array."""
     random = np.random.default_rng(0)
-    model = suited_models({**BLOCK, **known}, db)[0]
+    model = suited_models({**BLOCK, **question}, db)[0]
     p2 = np.exp(random.uniform(np.log(0.1), np.log(30.0), rows))
     columns = {
-        name: value * np.exp(random.uniform(-0.4, 0.4, rows)) for name, value in known.items()
+        name: value * np.exp(random.uniform(-0.4, 0.4, rows)) for name, value in question.items()
     }
     kr = columns["pgv_m_s"] * np.sqrt(p2) / 9.80665 * np.exp(random.uniform(-1.5, 0.3, rows))
     kr = np.minimum(kr, 0.99 * columns["pga_g"]) if "pga_g" in columns else kr
@@ -97,13 +97,13 @@ def array(db: str, known: dict[str, float], rows: int, *, interval: bool) -> lis
 
 def least(call: Callable[[], object], count: int) -> float:
     """Return the least mean processor time of several series of calls [s]."""
-    found = []
+    times = []
     for _ in range(REPEATS):
         before = time.process_time()
         for _ in range(count):
             call()
-        found.append((time.process_time() - before) / count)
-    return min(found)
+        times.append((time.process_time() - before) / count)
+    return min(times)
 
 
 if __name__ == "__main__":

@@ -12,7 +12,7 @@ import sys
 import numpy as np
 
 from rbfrag.exchange.event_losses import losses
-from rbfrag.exchange.openquake.events import JobFiles, read_events
+from rbfrag.exchange.openquake_events import job_files, read_events
 
 RAREST = 1e-4
 """Rates below are not resolved by the events [1/a]."""
@@ -26,7 +26,7 @@ ROUTES = {
 
 def main(folder: str) -> None:
     """Print the ratios of one job."""
-    sites = read_events(JobFiles.of(folder)).site_ids
+    sites = read_events(job_files(folder)).site_ids
     p2, kr = np.meshgrid([0.3, 1.0, 3.0, 10.0, 20.0, 30.0], [0.03, 0.05, 0.1, 0.2, 0.3, 0.4])
     blocks = {
         "p2_1_s2": np.tile(p2.ravel(), len(sites)),
@@ -38,10 +38,10 @@ def main(folder: str) -> None:
         return losses(folder, blocks, component="rotd50", expected=True, **about).block_rates[0]
 
     velocity = rates()
-    known = velocity > RAREST
-    print(f"{known.sum()} blocks that fail more than {RAREST:g} times a year by PGV")
+    is_shaken = velocity > RAREST
+    print(f"{is_shaken.sum()} blocks that fail more than {RAREST:g} times a year by PGV")
     for name, about in ROUTES.items():
-        ratio = np.log(rates(**about)[known] / velocity[known])
+        ratio = np.log(rates(**about)[is_shaken] / velocity[is_shaken])
         print(f"{name:20}{np.exp(ratio.mean()):6.2f}  sd of ln {ratio.std():.2f}")
 
 

@@ -22,8 +22,7 @@ from rbfrag.db.engine import opened_database
 from rbfrag.db.location import reference_file
 from rbfrag.db.model_file import read_models
 from rbfrag.db.models import save_model
-from rbfrag.exchange.block_draws import read_draws
-from rbfrag.exchange.block_rows import read_blocks
+from rbfrag.exchange.block_rows import read_blocks, read_draws
 from rbfrag.exchange.fragility_function import (
     FragilityFunction,
     discrete_function,
@@ -31,7 +30,7 @@ from rbfrag.exchange.fragility_function import (
 )
 from rbfrag.exchange.mesh_file import block_from_mesh
 from rbfrag.exchange.nrml import nrml_text, read_nrml
-from rbfrag.exchange.openquake.events import FILES, JobFiles, read_events
+from rbfrag.exchange.openquake_events import FILES, job_files, read_events
 from rbfrag.exchange.pelicun_table import pelicun_text, read_pelicun
 from rbfrag.exchange.shakemap import read_shakemap
 from rbfrag.exchange.table_answers import predict_table
@@ -39,16 +38,15 @@ from rbfrag.exchange.tables import files
 from rbfrag.exchange.tables.critical_values import import_critical_values
 from rbfrag.exchange.tables.files import write_block_table
 from rbfrag.hazards.branches import realization_weights
-from rbfrag.hazards.curve import hazard_curve
+from rbfrag.hazards.curve import IntensityType, hazard_curve
 from rbfrag.hazards.curve_file import read_hazard_curves
 from rbfrag.hazards.disaggregation import Disaggregation
-from rbfrag.hazards.measure_type import IntensityType
 from rbfrag.motions.formats.delimited_text import INDEX
 from rbfrag.motions.metadata import read_metadata
 from rbfrag.motions.readers import read_motions
+from rbfrag.motions.station_xml import sensitivities
 from rbfrag.question.gmm_table import read_gmm_table
-from rbfrag.rockmasses.file import read_rock_mass
-from rbfrag.rockmasses.orientations import read_planes
+from rbfrag.rockmasses.file import read_planes, read_rock_mass
 from rbfrag.service.settings import read_token
 from rbfrag.solver.block.file import read_block
 from tests.exchange.openquake_job import write_job
@@ -72,6 +70,13 @@ class Reader:
     sound: Callable[[], Sequence[bytes]]
     read: Callable[[Path], object]
 
+
+STATION_XML = (
+    b'<FDSNStationXML xmlns="http://www.fdsn.org/xml/station/1"><Network code="CE">'
+    b'<Station code="79435"><Channel code="HNE" locationCode="10"><Response>'
+    b"<InstrumentSensitivity><Value>214580.7</Value><InputUnits><Name>M/S**2</Name></InputUnits>"
+    b"</InstrumentSensitivity></Response></Channel></Station></Network></FDSNStationXML>",
+)
 
 BLOCKS_TOML = (
     b"alpha1_deg = -10.0\nalpha3_deg = 25.0\nr3_m = 1.5\nbeta_deg = 10.0\nphi_deg = 35.0\n",
@@ -174,7 +179,7 @@ def _functions() -> list[FragilityFunction]:
     ]
 
 
-def _made(suffix: str, write: Callable[[Path], object]) -> bytes:
+def _written(suffix: str, write: Callable[[Path], object]) -> bytes:
     """Return the content of a file that a function writes."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / f"made{suffix}"
@@ -186,14 +191,14 @@ def _made(suffix: str, write: Callable[[Path], object]) -> bytes:
 def _blocks(suffix: str) -> tuple[bytes, ...]:
     names = np.array([f"block {i}" for i in range(40)], dtype=object)
     columns = {"block_id": names, "p2_1_s2": np.linspace(0.3, 30.0, 40), "kr": np.full(40, 0.1)}
-    return (_made(suffix, lambda path: write_block_table(columns, path)),)
+    return (_written(suffix, lambda path: write_block_table(columns, path)),)
 
 
 @cache
 def _meshes(suffix: str) -> tuple[bytes, ...]:
     vertices, faces = box(0.4, 0.5, 1.1)
     if suffix == ".obj":
-        return (_made(suffix, lambda path: write_obj(path, (vertices, faces))),)
+        return (_written(suffix, lambda path: write_obj(path, (vertices, faces))),)
     import trimesh
 
     mesh = trimesh.Trimesh(vertices, faces, process=False)
@@ -226,7 +231,7 @@ def _database() -> tuple[bytes, ...]:
         with opened_database(path, create=True) as engine, engine.begin() as connection:
             save_model(connection, row)
 
-    return (_made(".db", write),)
+    return (_written(".db", write),)
 
 
 def _read_database(path: Path) -> object:
@@ -276,14 +281,14 @@ def _predict_by_arrow(path: Path) -> object:
 
 
 @cache
-def _job(what: str) -> tuple[bytes, ...]:
+def _job(name: str) -> tuple[bytes, ...]:
     with tempfile.TemporaryDirectory() as folder:
         write_job(Path(folder))
-        return (JobFiles.of(folder).paths()[what].read_bytes(),)
+        return (job_files(folder)[name].read_bytes(),)
 
 
-def _read_job(path: Path, what: str) -> object:
-    return read_events(JobFiles.of(write_job(path.with_name("job")), {what: path}))
+def _read_job(path: Path, name: str) -> object:
+    return read_events(job_files(write_job(path.with_name("job")), {name: path}))
 
 
 READERS: tuple[Reader, ...] = (
@@ -301,6 +306,7 @@ READERS: tuple[Reader, ...] = (
     Reader("disaggregation", ".csv", lambda: DISAGGREGATION, Disaggregation.read),
     Reader("metadata", ".csv", lambda: METADATA, read_metadata),
     Reader("index of intervals", INDEX, lambda: (b"list.txt 0.01\n",), _read_index),
+    Reader("StationXML", ".xml", lambda: STATION_XML, lambda file: sensitivities(file.parent)),
     Reader("zip of records", ".zip", _zips, read_motions),
     Reader("NRML", ".xml", lambda: (nrml_text(_functions()).encode(),), read_nrml),
     Reader("pelicun", ".csv", lambda: (pelicun_text(_functions()).encode(),), read_pelicun),
@@ -319,8 +325,8 @@ READERS: tuple[Reader, ...] = (
     Reader("mesh PLY", ".ply", lambda: _meshes(".ply"), block_from_mesh),
     Reader("mesh STL", ".stl", lambda: _meshes(".stl"), block_from_mesh),
     *(
-        Reader(f"OpenQuake {what}", ".csv", partial(_job, what), partial(_read_job, what=what))
-        for what in FILES
+        Reader(f"OpenQuake {name}", ".csv", partial(_job, name), partial(_read_job, name=name))
+        for name in FILES
     ),
     Reader("database", ".db", _database, _read_database),
     Reader("token", ".txt", lambda: (b"0123456789abcdefABCDEF\n",), lambda f: read_token(str(f))),

@@ -15,11 +15,11 @@ from numpy.typing import NDArray
 
 from benchmarks.page import markdown, parser, report
 from rbfrag.fragility.confidence import ParameterErrors, packed, quantiles_of
-from rbfrag.fragility.fit.clusters import cr3, jackknife_steps, left_out
 from rbfrag.fragility.fit.data import fit_data
 from rbfrag.fragility.fit.likelihood import censored_line, from_olsen, maximise, most_likely
 from rbfrag.fragility.fit.line import Bins, iterate
-from rbfrag.fragility.fit.outcomes import outcome_rows, parameter_names
+from rbfrag.fragility.fit.maximum_likelihood import outcome_rows, parameter_names
+from rbfrag.fragility.fit.result import cr3, jackknife_steps, left_out
 from rbfrag.fragility.measures import TERMS
 from rbfrag.fragility.method import arrays
 from rbfrag.fragility.methods import method_named
@@ -58,11 +58,11 @@ def lognormal(seed: int) -> Draw:
     noise += np.sqrt(0.8) * random.normal(size=event.size)
     y = truth[0] + truth[1] * x + np.exp(truth[2]) * noise
     limit = truth[0] + truth[1] * x - 0.4
-    found = y > limit
+    is_found = y > limit
     rows, start = censored_line(
         np.column_stack([np.ones(x.size), x]),
-        np.where(found, y, limit),
-        found,
+        np.where(is_found, y, limit),
+        is_found,
         event.astype(np.intp),
     )
     theta, _ = maximise(rows, start)
@@ -77,8 +77,8 @@ def straight_line(seed: int) -> Draw:
     bins, y = Bins.equal_count(table.pgv_m_s[order]), table.y_m_s[order]
     events = np.unique(table.event_id[order].astype(str), return_inverse=True)[1].astype(np.intp)
     b = iterate(bins, y, np.ones(y.size), 1).parameters
-    others = left_out(events, lambda rest: iterate(bins, y, rest.astype(float), 1, b).parameters)
-    return b[:2], np.array([0.002, 0.72]), (np.array(list(others.values())) - b)[:, :2]
+    refits = left_out(events, lambda rest: iterate(bins, y, rest.astype(float), 1, b).parameters)
+    return b[:2], np.array([0.002, 0.72]), (np.array(list(refits.values())) - b)[:, :2]
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -89,7 +89,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     draws = {f"{method}-{term}": (method, term) for method, term in TRUTH}
     cells = []
     for name in ("wls-pgv", "lognormal", *draws):
-        found, reach = [], []
+        estimates, reach = [], []
         for seed in range(chosen.replications):
             if name in draws:
                 b, truth, steps = outcomes(*draws[name], seed)
@@ -98,10 +98,10 @@ def main(arguments: Sequence[str] | None = None) -> None:
             covariance = cr3(steps)
             error = np.sqrt(np.diag(covariance))
             errors = ParameterErrors(packed(covariance.tolist()), tuple(map(tuple, steps.tolist())))
-            found.append((b - truth) / error)
+            estimates.append((b - truth) / error)
             # of each parameter alone
             reach.append(errors.half_width([*np.eye(b.size)], LEVEL, arrays()) / error)
-        z = np.array(found)
+        z = np.array(estimates)
         covered = (np.abs(z) <= np.array(reach)).mean(axis=0)
         cells.append([
             name,

@@ -15,8 +15,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from rbfrag.bench.cases import BenchCase
-from rbfrag.bench.peers import STABLE, TOPPLED, PeerAnswer, free_motion
+from rbfrag.bench.peers import STABLE, TOPPLED, BenchCase, PeerAnswer, free_motion
 from rbfrag.solver.rocking_run import REST_SPEED
 
 Real = np.longdouble

@@ -32,7 +32,7 @@ from benchmarks.page import RECORDS_VARIABLE, ROOT, markdown
 from rbfrag.campaign.add_motions import add_motions
 from rbfrag.campaign.simulate import CampaignProgress, CampaignSummary, simulate
 from rbfrag.db import schema
-from rbfrag.db.check.database import check_database
+from rbfrag.db.check import check_database
 from rbfrag.db.engine import opened_database
 from rbfrag.db.insert import update_rows
 from rbfrag.db.ledger import renew_ledger
@@ -131,21 +131,21 @@ def main(arguments: Sequence[str] | None = None) -> None:
         draw_recordings(full)
         for kind, suite in MODELS_ALONE.items():
             simulate(kind=kind, **{**run, "suite": suite})
-    made = chosen.work / "reference.db"
-    reduce(full, made)
+    database = chosen.work / "reference.db"
+    reduce(full, database)
     reports = []
     if not chosen.without_models:
-        reports = add_models(made, made, MODELS, chosen.jobs)
-        reports += add_models(full, made, MODELS_OF_ALL, chosen.jobs)
-    pack(made)
-    examine(made)
+        reports = add_models(database, database, MODELS, chosen.jobs)
+        reports += add_models(full, database, MODELS_OF_ALL, chosen.jobs)
+    pack(database)
+    examine(database)
     chosen.out.parent.mkdir(parents=True, exist_ok=True)
     # in place at once or not at all
     beside = chosen.out.with_name(f"{chosen.out.name}.new")
-    beside.write_bytes(made.read_bytes())
+    beside.write_bytes(database.read_bytes())
     beside.replace(chosen.out)
-    chosen.page.write_text(provenance(made, roots, summary, reports), encoding="utf-8")
-    print(f"{chosen.out}: {made.stat().st_size:,} bytes\n{chosen.page}")
+    chosen.page.write_text(provenance(database, roots, summary, reports), encoding="utf-8")
+    print(f"{chosen.out}: {database.stat().st_size:,} bytes\n{chosen.page}")
 
 
 def draw_recordings(full: Path) -> None:
@@ -166,9 +166,9 @@ def draw_recordings(full: Path) -> None:
         events = list(of_events)
         random.shuffle(events)
         for event in events:
-            places = list(of_events[event])
-            random.shuffle(places)
-            for place in places[:RECORDINGS]:
+            positions = list(of_events[event])
+            random.shuffle(positions)
+            for place in positions[:RECORDINGS]:
                 for number in of_events[event][place]:
                     add_to_suite(connection, FEW, number)
 
@@ -177,7 +177,7 @@ def show(progress: CampaignProgress) -> None:
     print(f"{progress.completed}/{progress.total} combinations", file=sys.stderr, flush=True)
 
 
-def reduce(full: Path, made: Path) -> None:
+def reduce(full: Path, database: Path) -> None:
     """Copy the full database without samples, and with no more of each combination than needed.
 
     Of toppling all stays but the grids of combinations with vertical motion, which no shipped model
@@ -185,15 +185,15 @@ def reduce(full: Path, made: Path) -> None:
     safe, and the upper ends of brackets. Of sliding the combinations of displacement 0 stay, whose
     grids are the whole curves.
     """
-    made.unlink(missing_ok=True)
+    database.unlink(missing_ok=True)
     raw = sqlite3.connect(full)
-    raw.execute("VACUUM INTO ?", (str(made),))
+    raw.execute("VACUUM INTO ?", (str(database),))
     raw.close()
     table, point = schema.combination, schema.simulation
     settings = func.json_extract(table.c.settings, "$.displacement_m")
     spare = table.c.kind.in_(list(MODELS_ALONE)) | ((table.c.kind == "sliding") & (settings != 0.0))
     vertical = select(table.c.id).where(table.c.vertical_motion_id.is_not(None))
-    with opened_database(made) as engine, engine.begin() as connection:
+    with opened_database(database) as engine, engine.begin() as connection:
         motion = schema.motion
         update_rows(connection, motion, motion.c.samples.is_not(None), {"samples": None})
         connection.execute(delete(schema.response))
@@ -218,9 +218,9 @@ def reduce(full: Path, made: Path) -> None:
         renew_ledger(connection)  # what is left is the whole of what is shipped
 
 
-def pack(made: Path) -> None:
+def pack(database: Path) -> None:
     """Leave one file without gaps or journal."""
-    raw = sqlite3.connect(made, isolation_level=None)
+    raw = sqlite3.connect(database, isolation_level=None)
     raw.execute(f"DROP INDEX IF EXISTS {SPARED_INDEX}")
     raw.execute("PRAGMA journal_mode = DELETE")
     raw.execute("VACUUM")
@@ -228,12 +228,12 @@ def pack(made: Path) -> None:
 
 
 def add_models(
-    source: Path, made: Path, models: Sequence[dict[str, Any]], jobs: int | None
+    source: Path, database: Path, models: Sequence[dict[str, Any]], jobs: int | None
 ) -> list[FitReport]:
     """Fit models to one database, without vertical motion, and store them in what is shipped."""
     with ProcessPoolExecutor(jobs, mp_context=get_context("spawn")) as pool:
         rows = list(pool.map(fitted_row, repeat(source), models))
-    with opened_database(made) as engine, engine.begin() as connection:
+    with opened_database(database) as engine, engine.begin() as connection:
         for row in rows:
             save_model(connection, row, replace=True)
     return [FitReport.from_model(FragilityModel.from_row(row)) for row in rows]
@@ -241,22 +241,24 @@ def add_models(
 
 def fitted_row(source: Path, options: dict[str, Any]) -> ModelRow:
     """Return one model, fitted in a process of its own."""
-    row = fit(source, **options).model.row
+    row = fit(source, bootstrap=True, dependence=True, **options).model.row
     print(f"fitted {row.name}", file=sys.stderr, flush=True)
     return row
 
 
-def examine(made: Path) -> None:
+def examine(database: Path) -> None:
     """Reject to ship a file that is damaged, too large, or holds samples."""
-    with opened_database(made, read_only=True) as engine, engine.connect() as connection:
+    with opened_database(database, read_only=True) as engine, engine.connect() as connection:
         findings = list(check_database(connection))
         if findings:
             raise SystemExit(f"the reduced database is damaged: {findings[0]}")
         column = schema.motion.c.samples
         if connection.execute(select(column).where(column.is_not(None))).first() is not None:
             raise SystemExit("the reduced database holds samples")
-    if made.stat().st_size > MOST_BYTES:
-        raise SystemExit(f"{made} has {made.stat().st_size:,} bytes, more than {MOST_BYTES:,}")
+    if database.stat().st_size > MOST_BYTES:
+        raise SystemExit(
+            f"{database} has {database.stat().st_size:,} bytes, more than {MOST_BYTES:,}"
+        )
 
 
 CLASSES: tuple[tuple[str, str, tuple[float, ...]], ...] = (
@@ -306,14 +308,14 @@ def class_table(
     names = {-1: "unknown", 0: f"below {edges[0]:g}", len(edges): f"{edges[-1]:g} and more"}
     names |= {i: f"{edges[i - 1]:g} to {edges[i]:g}" for i in range(1, len(edges))}
     cells = [
-        [names[number], str(len(some)), str(len({row["event_id"] for row in some}))]
-        for number, some in sorted(classes.items(), key=lambda item: item[0] % (len(edges) + 2))
+        [names[number], str(len(members)), str(len({row["event_id"] for row in members}))]
+        for number, members in sorted(classes.items(), key=lambda item: item[0] % (len(edges) + 2))
     ]
     return markdown(([words, "horizontal motions", "earthquakes"], cells))
 
 
 def provenance(
-    made: Path, roots: Sequence[Path], summary: CampaignSummary, models: Sequence[FitReport]
+    database: Path, roots: Sequence[Path], summary: CampaignSummary, models: Sequence[FitReport]
 ) -> str:
     """Return the page that says where the shipped data come from."""
     rows = manifest_rows(roots)
@@ -323,20 +325,22 @@ def provenance(
     cells = [
         [
             name,
-            some[0].get("format", "AT2 (PEER)"),
-            str(sum(not int(row["is_vertical"]) for row in some)),
-            str(sum(int(row["is_vertical"]) for row in some)),
-            str(len({row["event_id"] for row in some})),
+            members[0].get("format", "AT2 (PEER)"),
+            str(sum(not int(row["is_vertical"]) for row in members)),
+            str(sum(int(row["is_vertical"]) for row in members)),
+            str(len({row["event_id"] for row in members})),
             ", ".join(
-                sorted({row.get("source_repo") or SOURCES.get(name, "not stated") for row in some})
+                sorted(
+                    {row.get("source_repo") or SOURCES.get(name, "not stated") for row in members}
+                )
             ),
         ]
-        for name, some in sorted(sets.items())
+        for name, members in sorted(sets.items())
     ]
     headers = ["set", "format", "horizontal", "vertical", "earthquakes", "source repository"]
     horizontal = [row for row in rows if not int(row["is_vertical"])]
     table, point = schema.combination, schema.simulation
-    with opened_database(made, read_only=True) as engine, engine.connect() as connection:
+    with opened_database(database, read_only=True) as engine, engine.connect() as connection:
         digest = content_digest(connection)
         toppling = table.c.kind == "toppling"
         status = Counter(connection.scalars(select(table.c.status).where(toppling)))
@@ -405,8 +409,8 @@ The records themselves belong to the networks that made them and are not passed 
 | numerics version | {NUMERICS_VERSION} |
 | combinations | {summary.combinations:,} |
 | content digest | `{digest}` |
-| sha256 of the file | `{hashlib.sha256(made.read_bytes()).hexdigest()}` |
-| size | {made.stat().st_size:,} bytes |
+| sha256 of the file | `{hashlib.sha256(database.read_bytes()).hexdigest()}` |
+| size | {database.stat().st_size:,} bytes |
 
 The content digest is that of [equal databases](../howto/keep-a-database.md): it is the same for a
 file that was built elsewhere from the same records with the same numerics, as far as processors

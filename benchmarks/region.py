@@ -19,7 +19,6 @@ import numpy as np
 
 from benchmarks.page import markdown, parser, report
 from rbfrag.fragility.model import FragilityModel
-from rbfrag.hazards.annual_rate import failure_rate
 from rbfrag.hazards.curve import HazardCurve, hazard_curve
 from rbfrag.hazards.event_means import event_means
 from rbfrag.hazards.event_set import Duration, EventSet
@@ -28,6 +27,7 @@ from rbfrag.hazards.portfolio import Portfolio
 from rbfrag.hazards.rate_density import curve_mass
 from rbfrag.hazards.rate_integration import KernelBlocks, rates
 from rbfrag.hazards.shaking import HazardLevel
+from rbfrag.hazards.standing_blocks import failure_rate
 from rbfrag.question.components import component_named
 from rbfrag.question.keywords import model_for
 from rbfrag.question.question import predict
@@ -74,8 +74,8 @@ def of_curves(blocks: int, sites: int) -> None:
     model = model_for({}, (*numbers, shaking.name), "toppling")
     site = random.integers(0, sites, blocks)
     mass = curve_mass([curves], np.ones(1), shaking)
-    for _, own in KernelBlocks.of(model, shaking.median, numbers, site):
-        rates(own, mass, 0.95)
+    for _, kernel_blocks in KernelBlocks.of(model, shaking.median, numbers, site):
+        rates(kernel_blocks, mass, 0.95)
 
 
 def event_set(events: int, sites: int, blocks: int) -> tuple[EventSet, Portfolio]:
@@ -85,7 +85,7 @@ def event_set(events: int, sites: int, blocks: int) -> tuple[EventSet, Portfolio
     u = random.normal(np.log(0.08), 1.0, events)[:, None] + random.normal(0, 0.5, (events, sites))
     names = tuple(f"s{i}" for i in range(sites))
     number = np.arange(events)
-    made = EventSet(
+    event_set_of_rows = EventSet(
         number, np.zeros_like(number), number // 3 + 1, np.full(events, 1e-4), names, event, site,
         {"pgv_m_s": np.exp(u).ravel()}, Duration(1e4, 1), {0: 1.0},
     )  # fmt: skip
@@ -97,7 +97,9 @@ def event_set(events: int, sites: int, blocks: int) -> tuple[EventSet, Portfolio
         "site_id": np.array([names[i] for i in random.integers(0, sites, blocks)], dtype=object),
     }  # fmt: skip
     model = model_for({}, ("p2", "kr", "pgv_m_s"), "toppling")
-    return made, Portfolio.of(columns, names, {"toppling": model}, component_named("rotd50"))
+    return event_set_of_rows, Portfolio.of(
+        columns, names, {"toppling": model}, component_named("rotd50")
+    )
 
 
 def of_events(events: int, sites: int, blocks: int) -> None:
@@ -151,8 +153,10 @@ def exactness() -> list[list[str]]:
             shaking = HazardLevel.of(curve, component=component)
             model = model_for({}, (*numbers, shaking.name), kind)
             mass = curve_mass([[curve]], np.ones(1), shaking)
-            ((_, own),) = KernelBlocks.of(model, shaking.median, numbers, np.zeros(BLOCKS, np.intp))
-            result = rates(own, mass, 0.95)
+            ((_, kernel_blocks),) = KernelBlocks.of(
+                model, shaking.median, numbers, np.zeros(BLOCKS, np.intp)
+            )
+            result = rates(kernel_blocks, mass, 0.95)
             dense = by_predict(curve, shaking, model, numbers)
             seen = dense > 1e-8
             row += [
@@ -174,9 +178,9 @@ def by_predict(
     mass = np.append(-np.diff(rate), rate[-1])
     total = np.zeros(next(iter(numbers.values())).size)
     for shift, weight in zip(shaking.shift, shaking.weight, strict=True):
-        each = {name: value[:, None] for name, value in numbers.items()}
-        asked: Any = {**each, shaking.name: np.exp(middle) * shift, "model": model.row}
-        total += weight * (predict(interval=False, **asked).probability @ mass)
+        columns = {name: value[:, None] for name, value in numbers.items()}
+        question: Any = {**columns, shaking.name: np.exp(middle) * shift, "model": model.row}
+        total += weight * (predict(interval=False, **question).probability @ mass)
     return total
 
 
@@ -187,7 +191,7 @@ def drawn_models(model: FragilityModel, n: int, seed: int) -> list[FragilityMode
     """Return the model by draws of its parameters."""
     random = np.random.default_rng(seed)
     drawn = random.multivariate_normal(model.parameters, np.array(model.row.covariance), n)
-    return [replace(model, parameters=tuple(each)) for each in drawn.tolist()]
+    return [replace(model, parameters=tuple(draw)) for draw in drawn.tolist()]
 
 
 def intervals() -> list[list[str]]:
@@ -197,14 +201,17 @@ def intervals() -> list[list[str]]:
     numbers = toppling(109, np.random.default_rng(3))
     model = model_for({}, (*numbers, shaking.name), "toppling")
     mass = curve_mass([[curve]], np.ones(1), shaking)
-    ((_, own),) = KernelBlocks.of(model, shaking.median, numbers, np.zeros(109, dtype=np.intp))
-    result = rates(own, mass, 0.95)
-    each = np.array([
-        rates(replace(own, model=one), mass, 0.95).rate for one in drawn_models(model, 1000, 4)
+    ((_, kernel_blocks),) = KernelBlocks.of(
+        model, shaking.median, numbers, np.zeros(109, dtype=np.intp)
+    )
+    result = rates(kernel_blocks, mass, 0.95)
+    rates_of_draws = np.array([
+        rates(replace(kernel_blocks, model=drawn), mass, 0.95).rate
+        for drawn in drawn_models(model, 1000, 4)
     ])  # fmt: skip
     variance = np.einsum("km,kl,lm->m", result.gradient, model.row.covariance, result.gradient)
     with np.errstate(divide="ignore"):
-        sd = np.log(each).std(axis=0)
+        sd = np.log(rates_of_draws).std(axis=0)
     rows = []
     for low, high in ((1e-5, np.inf), (1e-7, 1e-5)):
         seen = (result.rate > low) & (result.rate <= high)
@@ -227,21 +234,21 @@ def of_sums() -> list[list[str]]:
     answer = event_losses(events, portfolio, samples=100, level=0.6826894921370859)
     used = time.process_time() - start
     (curve,) = answer.exceedance.values()
-    by_count = {one.value: one for one in curve}
+    by_count = {drawn_model.value: drawn_model for drawn_model in curve}
     model = portfolio.answering[0]
     total, reached = [], []
     with patch("rbfrag.hazards.losses.shifted_portfolios", return_value=()):
         start = time.process_time()
         event_losses(events, portfolio, samples=100)
         alone = time.process_time() - start
-        for one in drawn_models(model, DRAWS, 7):
-            values = dict(zip(model.row.coefficients, one.parameters, strict=True))
+        for drawn_model in drawn_models(model, DRAWS, 7):
+            values = dict(zip(model.row.coefficients, drawn_model.parameters, strict=True))
             moved = replace(portfolio, models=(replace(model.row, coefficients=values),))
-            found = event_losses(events, moved, samples=100)
-            total.append(found.average_annual_failures)
-            (drawn,) = found.exceedance.values()
-            known = {each.value: each.annual_rate for each in drawn}
-            reached.append([known.get(count, np.nan) for count in COUNTS])
+            samples_answer = event_losses(events, moved, samples=100)
+            total.append(samples_answer.average_annual_failures)
+            (drawn,) = samples_answer.exceedance.values()
+            rate_by_count = {point.value: point.annual_rate for point in drawn}
+            reached.append([rate_by_count.get(count, np.nan) for count in COUNTS])
     low, high = answer.uncertainty["average_annual_failures"].fragility or (np.nan, np.nan)
     names = ["failures a year", *(f"{count} or more fail" for count in COUNTS)]
     ends = [(low, high), *(by_count[count].fragility for count in COUNTS)]
@@ -266,8 +273,10 @@ def thinned() -> list[list[str]]:
             def p(x: FloatArray, m: float = median) -> FloatArray:
                 return np.asarray(ndtr(np.log(x / m) / 0.4))
 
-            each = [failure_rate(one, p).annual_rate[0] for one in (bending(1000), bending(n))]
-            row.append(f"{100.0 * (each[1] / each[0] - 1.0):+.2f} %")
+            rates_of_curves = [
+                failure_rate(curve, p).annual_rate[0] for curve in (bending(1000), bending(n))
+            ]
+            row.append(f"{100.0 * (rates_of_curves[1] / rates_of_curves[0] - 1.0):+.2f} %")
         rows.append(row)
     return rows
 

@@ -61,7 +61,7 @@ def run(
     Raises:
         RuntimeError: it failed; with its last lines.
     """
-    done = subprocess.run(
+    process = subprocess.run(
         [str(part) for part in command],
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
@@ -70,10 +70,10 @@ def run(
         env=env,
         check=False,
     )
-    if done.returncode:
-        last = "\n".join(done.stdout.splitlines()[-15:])
-        raise RuntimeError(f"{' '.join(map(str, command))}: status {done.returncode}\n{last}")
-    return done.stdout
+    if process.returncode:
+        last = "\n".join(process.stdout.splitlines()[-15:])
+        raise RuntimeError(f"{' '.join(map(str, command))}: status {process.returncode}\n{last}")
+    return process.stdout
 
 
 def versions_agree(root: Path = ROOT) -> str:
@@ -87,14 +87,14 @@ def versions_agree(root: Path = ROOT) -> str:
     heading = _HEADING.search((root / "CHANGELOG.md").read_text(encoding="utf-8"))
     if version is None or cited is None or heading is None:
         raise RuntimeError("no version in rbfrag/version.py, CITATION.cff or CHANGELOG.md")
-    stated = {
+    versions = {
         "rbfrag/version.py": version[1],
         "CITATION.cff": cited[1],
         "CHANGELOG.md": heading["version"],
     }
-    if len(set(stated.values())) > 1:
+    if len(set(versions.values())) > 1:
         raise RuntimeError(
-            "the versions differ: " + ", ".join(f"{name} {text}" for name, text in stated.items())
+            "the versions differ: " + ", ".join(f"{name} {text}" for name, text in versions.items())
         )
     if heading["day"] is None:
         raise RuntimeError(
@@ -128,8 +128,8 @@ def shipped_component(folder: Path) -> dict[str, object]:
 
 def differing(shipped: Iterable[str], committed: Iterable[str]) -> str:
     """Return which files are there too many or too few, as a text; empty when none."""
-    there, wanted = set(shipped), set(committed)
-    parts = [("not in the commit", there - wanted), ("missing", wanted - there)]
+    there, expected = set(shipped), set(committed)
+    parts = [("not in the commit", there - expected), ("missing", expected - there)]
     return "; ".join(f"{word}: {', '.join(sorted(names)[:8])}" for word, names in parts if names)
 
 
@@ -168,11 +168,11 @@ class Check:
             shipped = [name for name in packed.namelist() if ".dist-info/" not in name]
         with tarfile.open(self.sdist) as archive:
             sources = [m.name.split("/", 1)[1] for m in archive.getmembers() if m.isfile()]
-        for name, there, wanted in (
+        for name, there, expected in (
             ("wheel", shipped, [file for file in self.committed if file.startswith("rbfrag/")]),
             ("source distribution", sources, [*self.committed, "PKG-INFO"]),
         ):
-            if words := differing(there, wanted):
+            if words := differing(there, expected):
                 raise RuntimeError(f"{name}: {words}")
         return f"wheel {len(shipped)} files, source distribution {len(sources)}, as committed"
 
@@ -254,8 +254,8 @@ class Check:
         for row in sorted(rows, key=lambda row: str(row["Name"]).lower()):
             licence = " ".join(row["License"].split())[:80]
             print(f"        {row['Name']:28} {row['Version']:14} {licence}")
-            known = any(word in row["License"] for word in LICENCES)
-            if not known and row["Name"] not in DATA_ONLY:
+            is_known = any(word in row["License"] for word in LICENCES)
+            if not is_known and row["Name"] not in DATA_ONLY:
                 odd.append(f"{row['Name']}: {row['License'][:40]}")
         if odd:
             raise RuntimeError("a licence that is not on the list: " + "; ".join(odd))

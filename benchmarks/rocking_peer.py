@@ -12,12 +12,10 @@ from functools import partial
 import numpy as np
 
 from benchmarks.reference import reference
-from rbfrag.bench.cases import BenchCase
-from rbfrag.bench.peers import STABLE, TOPPLED, PeerAnswer, Real, free_motion
+from rbfrag.bench.peers import STABLE, TOPPLED, BenchCase, PeerAnswer, Real, free_motion
 from rbfrag.bench.work_precision import BenchMethod, step_setting
 from rbfrag.solver.integrator.compiled import kernel
-from rbfrag.solver.integrator.free_rocking import IMPACTS_THAT_DECIDE
-from rbfrag.solver.integrator.rocking_kernel import PAST_BALANCE
+from rbfrag.solver.integrator.rocking_kernel import IMPACTS_THAT_DECIDE, PAST_BALANCE
 from rbfrag.solver.integrator.taylor import ORDER
 from rbfrag.solver.models.rocking import free_block
 from rbfrag.solver.respond import block_of_numbers

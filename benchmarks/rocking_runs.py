@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from benchmarks.page import ROOT, find_records, markdown, parser, report
-from rbfrag.bench.cases import Records
+from rbfrag.bench.peers import Records
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.excitation import excitation
@@ -90,23 +90,23 @@ def main(arguments: Sequence[str] | None = None) -> None:
     chosen = parser(__doc__)
     chosen.add_argument("--runs", type=int, default=60)
     options = chosen.parse_args(arguments)
-    found = find_records(options.records)
-    runs = [compare(each) for each in draw(found, options.runs)]
+    records = find_records(options.records)
+    runs = [compare(run) for run in draw(records, options.runs)]
     given_up = [run for run in runs if run.impacts < 0]
     cells, reached = [], not given_up
-    for low, high, asked in GROUPS:
+    for low, high, limit in GROUPS:
         group = [run for run in runs if low <= run.impacts <= (high or MOST_IMPACTS)]
         calm = [run for run in group if not run.sensitive]
         stays = [run.deviation for run in calm if not math.isnan(run.deviation)]
         greatest = max(stays, default=0.0)
-        reached &= asked is None or greatest <= asked
+        reached &= limit is None or greatest <= limit
         cells.append(
             [
                 f"{low} to {high}" if high else f"{low} and more",
                 str(len(group)), str(len(group) - len(calm)),
                 f"{sum(run.same for run in calm)} of {len(calm)}", str(len(stays)),
                 f"{np.median(stays):.1g}" if stays else "", f"{greatest:.1g}" if stays else "",
-                "" if asked is None else f"≤ {asked:.0e}",
+                "" if limit is None else f"≤ {limit:.0e}",
             ]
         )  # fmt: skip
     many = [run for run in runs if run.all_impacts > MANY_IMPACTS]
@@ -116,7 +116,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     ]  # fmt: skip
     text = (
         f"{markdown((headers, cells))}\n\n{len(runs) - len(given_up)} of {len(runs)} drawn runs "
-        f"compared, under {found.source}; {len(many)} have more than {MANY_IMPACTS} impacts, "
+        f"compared, under {records.source}; {len(many)} have more than {MANY_IMPACTS} impacts, "
         f"and {sum(run.same for run in many)} of them end alike."
     )
     report("rocking-runs", text, write=options.write, page=PAGE)
@@ -152,9 +152,9 @@ def draw(records: Records, number: int, *, seed: int = 1) -> list[Drawn]:
         angles = (
             (beta - weaker, beta + other) if rng.random() < 0.5 else (beta - other, beta + weaker)
         )
-        each = Drawn(motion, *angles, size, beta, restitution, vertical)
-        if each.run().started_s is not None:
-            drawn.append(each)
+        run = Drawn(motion, *angles, size, beta, restitution, vertical)
+        if run.run().started_s is not None:
+            drawn.append(run)
     return drawn
 
 
@@ -167,11 +167,11 @@ def compare(drawn: Drawn) -> Compared:
     if not toppled and ours.peak_theta_rad is not None and not truth.toppled:
         greatest = max(truth.peak.values())
         deviation = abs(ours.peak_theta_rad - greatest) / greatest
-    done = len(truth.impact_s)
-    impacts = done if truth.toppled else truth.impacts_to_peak
+    n_impacts = len(truth.impact_s)
+    impacts = n_impacts if truth.toppled else truth.impacts_to_peak
     return Compared(
         sense == truth.toppled, bool(ours.sensitive),
-        impacts if done <= MOST_IMPACTS else -1, done, deviation,
+        impacts if n_impacts <= MOST_IMPACTS else -1, n_impacts, deviation,
     )  # fmt: skip
 
 

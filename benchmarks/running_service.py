@@ -65,27 +65,27 @@ class Running:
 
 def free_port() -> int:
     """Return a port that nobody listens at."""
-    with socket.socket() as free:
-        free.bind(("127.0.0.1", 0))
-        port: int = free.getsockname()[1]
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port: int = probe.getsockname()[1]
         return port
 
 
 @contextmanager
 def running_service(
-    folder: Path, *, environment: dict[str, str] | None = None, **told: Any
+    folder: Path, *, environment: dict[str, str] | None = None, **options: Any
 ) -> Iterator[Running]:
     """Start a service on the models that are shipped, and end it.
 
     Args:
         folder: where its log and its database go.
         environment: further environment variables.
-        told: options of `rbfrag serve`, underlines for dashes.
+        options: options of `rbfrag serve`, underlines for dashes.
     """
     port = free_port()
     # a copy: the shipped one may be made anew meanwhile
     database = shutil.copyfile(REFERENCE, folder / "models.db")
-    settings = {"db": str(database), "port": port, **told}
+    settings = {"db": str(database), "port": port, **options}
     with running_program(
         ["-m", "rbfrag.service"],
         folder / "service.log",
@@ -97,14 +97,14 @@ def running_service(
 
 @contextmanager
 def running_program(
-    words: list[str], log: Path, asked: str, environment: dict[str, str]
+    words: list[str], log: Path, url: str, environment: dict[str, str]
 ) -> Iterator[subprocess.Popen[bytes]]:
     """Start a Python program that answers at an address, and end it.
 
     Args:
         words: what Python is called with.
         log: file for what it prints.
-        asked: address that answers once it is ready.
+        url: address that answers once it is ready.
         environment: further environment variables.
     """
     everything = {**os.environ, "PYTHONPATH": str(ROOT), **environment}
@@ -113,7 +113,7 @@ def running_program(
             [sys.executable, *words], cwd=ROOT, env=everything, stdout=stream, stderr=stream
         )
         try:
-            _wait(process, asked, log)
+            _wait(process, url, log)
             yield process
         finally:
             if process.poll() is None:
@@ -121,14 +121,14 @@ def running_program(
             process.wait(PATIENCE_S)
 
 
-def _wait(process: subprocess.Popen[bytes], asked: str, log: Path) -> None:
+def _wait(process: subprocess.Popen[bytes], url: str, log: Path) -> None:
     end = time.monotonic() + PATIENCE_S
     while time.monotonic() < end:
         if process.poll() is not None:
             raise RuntimeError(f"the program ended at its start: {log.read_text()}")
         try:
-            with urllib.request.urlopen(asked, timeout=5.0):
+            with urllib.request.urlopen(url, timeout=5.0):
                 return
         except OSError:
             time.sleep(0.1)
-    raise RuntimeError(f"nothing answers at {asked}: {log.read_text()}")
+    raise RuntimeError(f"nothing answers at {url}: {log.read_text()}")

@@ -32,22 +32,22 @@ SHARES = (0.0, 0.01, 0.1, 0.25, 0.5, 1.0)
 
 def main() -> None:
     """Run the campaigns and print, or write, their tables."""
-    made = parser(__doc__)
-    made.add_argument("--db", type=Path, required=True, help="database with the motions")
-    given = made.parse_args()
+    options = parser(__doc__)
+    options.add_argument("--db", type=Path, required=True, help="database with the motions")
+    chosen = options.parse_args()
     tables = {}
     for kind, draws in DRAWS.items():
-        summary = simulate(given.db, kind=kind, sequence=True, draws=draws, jobs=1)
+        summary = simulate(chosen.db, kind=kind, sequence=True, draws=draws, jobs=1)
         assert summary.sequence is not None
         rows = summary.sequence.conditional
         tables[f"{kind}-all"] = conditional_table(rows)
         tables[kind] = conditional_table(
             (row for row in rows if _limit(row) == SHOWN[kind]), short=True
         )
-    tables["geometry"] = geometry_table(read_table("shock_pair", db=given.db))
+    tables["geometry"] = geometry_table(read_table("shock_pair", db=chosen.db))
     for name, text in tables.items():
         print(f"\n{name}\n\n{text}")
-        if given.write:
+        if chosen.write:
             write_table(HOWTO, name, text)
 
 
@@ -100,7 +100,7 @@ def geometry_table(pairs: pd.DataFrame) -> str:
         & (pairs.intact_outcome == "stable")
         & (pairs.intact_rotation_rad > LEAST_RAD)
     ]
-    left = slumps.first_rotation_rad / slumps.critical_rad
+    ratio_left = slumps.first_rotation_rad / slumps.critical_rad
     ratio = (slumps.second_rotation_rad - slumps.first_rotation_rad) / slumps.intact_rotation_rad
     lines = [
         "| rotation that the first leaves, of the one without strength | slumps | ratio, 10 % | "
@@ -108,9 +108,9 @@ def geometry_table(pairs: pd.DataFrame) -> str:
         "| --- " * 5 + "|",
     ]
     for low, high in pairwise(SHARES):
-        some = ratio[(left > low) & (left <= high)]
-        ends = " | ".join(f"{value:.2f}" for value in np.percentile(some, [10, 50, 90]))
-        lines.append(f"| {low:.0%} to {high:.0%} | {len(some)} | {ends} |")
+        in_class = ratio[(ratio_left > low) & (ratio_left <= high)]
+        ends = " | ".join(f"{value:.2f}" for value in np.percentile(in_class, [10, 50, 90]))
+        lines.append(f"| {low:.0%} to {high:.0%} | {len(in_class)} | {ends} |")
     return "\n".join(
         [*lines, "", f"Of {len(slides)} slides the sum differs by {off:.1g} m at most."]
     )

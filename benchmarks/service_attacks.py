@@ -24,7 +24,7 @@ from benchmarks.running_service import Running, running_service
 from rbfrag.service.work import EXAMPLE as RECORD
 
 PAGE = ROOT / "docs" / "howto" / "service.md"
-ONE = "/v1/predict?p2=3&kr=0.1&pgv=0.6"
+QUESTION = "/v1/predict?p2=3&kr=0.1&pgv=0.6"
 TIME_LIMIT_S = 60.0
 
 
@@ -63,7 +63,7 @@ def repeated(
 @contextmanager
 def nothing(running: Running) -> Iterator[None]:
     """Leave the service alone."""
-    assert ask(running, "GET", ONE) == 200
+    assert ask(running, "GET", QUESTION) == 200
     yield
 
 
@@ -75,22 +75,22 @@ def locked_file(running: Running) -> Iterator[None]:
         other.execute("PRAGMA journal_mode = DELETE")
         other.execute("BEGIN EXCLUSIVE")
         os.utime(place)  # the models are to be read again
-        with repeated(running, "GET", ONE):
+        with repeated(running, "GET", QUESTION):
             yield
             other.execute("ROLLBACK")
 
 
-ASKED = b'{"p2": 3, "kr": 0.1, "pgv": 0.6}'
+BODY = b'{"p2": 3, "kr": 0.1, "pgv": 0.6}'
 
 
 @contextmanager
-def unfinished(running: Running, count: int, stated: int, sent: int) -> Iterator[None]:
+def unfinished(running: Running, count: int, declared: int, sent: int) -> Iterator[None]:
     """Promise bodies [bytes] and send a part of them."""
     head = b"POST /v1/predict HTTP/1.1\r\nhost: localhost\r\ncontent-length: %d\r\n\r\n"
     with ExitStack() as wires:
         for _ in range(count):
             wire = wires.enter_context(socket.create_connection(("127.0.0.1", running.port), 60))
-            wire.sendall(head % stated + b" " * sent)
+            wire.sendall(head % declared + b" " * sent)
         yield
 
 
@@ -99,7 +99,7 @@ def idle_bodies(running: Running) -> Iterator[None]:
     """Promise 40 bodies of 1000 bytes and send none, while somebody asks honestly."""
     with (
         unfinished(running, 40, 1000, 0),
-        repeated(running, "POST", "/v1/predict", ASKED),
+        repeated(running, "POST", "/v1/predict", BODY),
     ):
         yield
 
@@ -111,7 +111,7 @@ def beside_half_sent(running: Running, rounds: int = 20) -> np.ndarray:
         with unfinished(running, 32, 128_000, 66_000):
             time.sleep(0.2)
             began = time.perf_counter()
-            assert ask(running, "POST", "/v1/predict", b" " * 240_000 + ASKED) == 200
+            assert ask(running, "POST", "/v1/predict", b" " * 240_000 + BODY) == 200
             took.append(time.perf_counter() - began)
     return np.array(took)
 
@@ -146,7 +146,7 @@ def locked_table(running: Running, server: str) -> Iterator[None]:
 
     with psycopg.connect(server) as other:
         other.execute("LOCK TABLE fragility_model IN ACCESS EXCLUSIVE MODE")
-        with repeated(running, "GET", ONE):
+        with repeated(running, "GET", QUESTION):
             yield
             other.rollback()
 
@@ -187,7 +187,7 @@ def on_server(server: str, folder: Path, seconds: float) -> list[str]:
                     if model.kind == "toppling":
                         save_model(connection, model)
             with running_service(folder, db=place, time_limit=TIME_LIMIT_S) as running:
-                assert ask(running, "GET", ONE) == 200
+                assert ask(running, "GET", QUESTION) == 200
                 with locked_table(running, place):
                     return row("a table of PostgreSQL is locked", measured(running, seconds))
         finally:

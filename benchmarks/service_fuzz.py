@@ -41,17 +41,19 @@ def main(arguments: Sequence[str] | None = None) -> int:
         folder = Path(name)
         # a small limit of rows keeps the rock masses short that are made up
         with running_service(folder, jobs=1, row_limit=2000, time_limit=60.0) as service:
-            status = asked(service.address, folder, chosen.cases, chosen.seed, chosen.phases)
-            found = json.loads((folder / "report.json").read_text())
+            status = run_schemathesis(
+                service.address, folder, chosen.cases, chosen.seed, chosen.phases
+            )
+            summary = json.loads((folder / "report.json").read_text())
             statuses = Counter(
                 line["status"] for line in service.lines() if line["event"] == "request"
             )
             errors = [line for line in service.lines() if line["level"] == "error"]
     for line in errors:
         print(line.get("exception", line["message"]))
-    cases = found["test_cases"]
+    cases = summary["test_cases"]
     print(
-        f"{cases['generated']} cases on {found['operations']['tested']} operations, seed "
+        f"{cases['generated']} cases on {summary['operations']['tested']} operations, seed "
         f"{chosen.seed}: {cases['unique_failures']} kinds of failures, {cases['errored']} not "
         f"sent or not answered; answers by status "
         + ", ".join(f"{status}: {count}" for status, count in sorted(statuses.items()))
@@ -59,7 +61,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return int(status != 0 or bool(errors))
 
 
-def asked(address: str, folder: Path, cases: int, seed: int, phases: str) -> int:
+def run_schemathesis(address: str, folder: Path, cases: int, seed: int, phases: str) -> int:
     """Let schemathesis ask; print what it complains of and return its exit status."""
     words = [
         *("run", f"{address}/v1/openapi.json"),
@@ -81,17 +83,17 @@ def asked(address: str, folder: Path, cases: int, seed: int, phases: str) -> int
         "SCHEMATHESIS_HOOKS": "benchmarks.toml_serializer",
     }
     program = "from schemathesis.cli import schemathesis; schemathesis()"
-    done = subprocess.run(
+    process = subprocess.run(
         [sys.executable, "-c", program, *words],
         cwd=folder,
         env=environment,
         capture_output=True,
         text=True,
     )
-    if done.returncode != 0:
-        print(re.sub(r"(?s).*?(=+ (ERRORS|FAILURES) =+)", r"\1", done.stdout, count=1))
-        print(done.stderr)
-    return done.returncode
+    if process.returncode != 0:
+        print(re.sub(r"(?s).*?(=+ (ERRORS|FAILURES) =+)", r"\1", process.stdout, count=1))
+        print(process.stderr)
+    return process.returncode
 
 
 if __name__ == "__main__":

@@ -64,11 +64,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
             return soak(Path(folder), chosen.soak, chosen.connections, write=chosen.write)
         rows, bad = [], 0
         for workers in (1, 2):
-            found = compared(
+            measured = compared(
                 Path(folder), workers, chosen.seconds, chosen.repeat, chosen.connections
             )
-            bad += sum(load.bad for loads in found for load in loads)
-            rows += table_rows(workers, found)
+            bad += sum(load.bad for loads in measured for load in loads)
+            rows += table_rows(workers, measured)
         head = [
             *("processes", "what", "requests a second", "p50", "p99", "processor time a request"),
             *("ratio to it", "of pairs", "by processor time"),
@@ -84,30 +84,30 @@ def compared(
     port = free_port()
     constant = ["-m", "benchmarks.constant_service", str(port), str(workers)]
     address = f"http://127.0.0.1:{port}"
-    found: list[list[Load]] = [[], [], [], []]
+    measured: list[list[Load]] = [[], [], [], []]
     with (
         running_service(folder, workers=workers) as service,
         running_program(constant, folder / "constant.log", f"{address}/bare", {}) as other,
     ):
-        asked = (
-            (f"{service.address}/v1/predict{QUERY}", service.process.pid, found[0]),
-            (f"{address}/constant{QUERY}", other.pid, found[1]),
-            (f"{address}/model{QUERY}", other.pid, found[2]),
-            (f"{address}/bare", other.pid, found[3]),
+        targets = (
+            (f"{service.address}/v1/predict{QUERY}", service.process.pid, measured[0]),
+            (f"{address}/constant{QUERY}", other.pid, measured[1]),
+            (f"{address}/model{QUERY}", other.pid, measured[2]),
+            (f"{address}/bare", other.pid, measured[3]),
         )
-        for url, _, _ in asked:
+        for url, _, _ in targets:
             wrk(url, 2, connections)
         for _ in range(10 * workers):
             # until every process for long work has come up, which takes processor time
             upload(service.address)
         for turn in range(repeat):
             # the order alternates, so that whatever else the machine does hits each alike
-            for url, pid, loads in asked if turn % 2 == 0 else reversed(asked):
+            for url, pid, loads in targets if turn % 2 == 0 else reversed(targets):
                 before = processor_s(pid)
                 load = wrk(url, seconds, connections)
                 spent = processor_s(pid) - before
                 loads.append(replace(load, cpu_us=1e6 * spent / max(load.answers, 1)))
-    return found
+    return measured
 
 
 def wrk(url: str, seconds: int, connections: int) -> Load:
@@ -117,24 +117,24 @@ def wrk(url: str, seconds: int, connections: int) -> Load:
     errors = re.search(r"Socket errors: connect (\d+), read (\d+), write (\d+), timeout", printed)
     rejected = re.search(r"Non-2xx or 3xx responses: (\d+)", printed)
     return Load(
-        per_s=float(_found(r"Requests/sec:\s+([\d.]+)", printed)[0]),
+        per_s=float(_groups(r"Requests/sec:\s+([\d.]+)", printed)[0]),
         p50_ms=_milliseconds(printed, "50"),
         p99_ms=_milliseconds(printed, "99"),
-        answers=int(_found(r"(\d+) requests in", printed)[0]),
+        answers=int(_groups(r"(\d+) requests in", printed)[0]),
         bad=(int(rejected[1]) if rejected else 0)
         + (sum(map(int, errors.groups())) if errors else 0),
     )
 
 
-def _found(pattern: str, text: str) -> tuple[str, ...]:
-    found = re.search(pattern, text)
-    if found is None:
+def _groups(pattern: str, text: str) -> tuple[str, ...]:
+    match = re.search(pattern, text)
+    if match is None:
         raise SystemExit(f"wrk printed something else than expected:\n{text}")
-    return found.groups()
+    return match.groups()
 
 
 def _milliseconds(printed: str, percent: str) -> float:
-    value, unit = _found(rf"\s{percent}%\s+([\d.]+)(us|ms|s)\b", printed)
+    value, unit = _groups(rf"\s{percent}%\s+([\d.]+)(us|ms|s)\b", printed)
     return float(value) * _UNIT_MS[unit]
 
 
@@ -146,11 +146,11 @@ NAMES = (
 )
 
 
-def table_rows(workers: int, found: list[list[Load]]) -> list[list[str]]:
+def table_rows(workers: int, measured: list[list[Load]]) -> list[list[str]]:
     """Return the rows of the table for one number of processes."""
     rows = []
-    ours = found[0]
-    for name, loads in zip(NAMES, found, strict=True):
+    ours = measured[0]
+    for name, loads in zip(NAMES, measured, strict=True):
         ratios = [a.per_s / b.per_s for a, b in zip(ours, loads, strict=True)]
         of_cpu = [b.cpu_us / a.cpu_us for a, b in zip(ours, loads, strict=True)]
         rows.append(
@@ -203,9 +203,9 @@ def soak(folder: Path, minutes: float, connections: int, *, write: bool) -> int:
 def processor_s(pid: int) -> float:
     """Return the processor time of a process and of those it started [s]."""
     fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
-    own = (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+    fields_s = (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
     children = Path(f"/proc/{pid}/task/{pid}/children").read_text().split()
-    return own + sum(processor_s(int(child)) for child in children)
+    return fields_s + sum(processor_s(int(child)) for child in children)
 
 
 def upload(address: str) -> None:
@@ -219,7 +219,7 @@ def upload(address: str) -> None:
 def memory_kb(pid: int) -> int:
     """Return the resident memory of a process that answers [KiB]."""
     status = Path(f"/proc/{pid}/status").read_text()
-    return int(_found(r"VmRSS:\s+(\d+) kB", status)[0])
+    return int(_groups(r"VmRSS:\s+(\d+) kB", status)[0])
 
 
 if __name__ == "__main__":

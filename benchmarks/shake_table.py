@@ -35,11 +35,11 @@ from benchmarks.shake_table_runs import (
 from rbfrag.db.location import REFERENCE
 from rbfrag.db.model_file import ModelRow, held_out_loss
 from rbfrag.fragility.fit.likelihood import Binomial, most_likely
-from rbfrag.fragility.fit.scores import CLIP
+from rbfrag.fragility.fit.result import CLIP
 from rbfrag.fragility.measures import TERMS
 from rbfrag.fragility.method import LOGIT
 from rbfrag.fragility.model_selection import stored_rows
-from rbfrag.solver.integrator.free_rocking import STABLE, TOPPLED
+from rbfrag.solver.integrator.rocking_kernel import STABLE, TOPPLED
 from rbfrag.solver.models.rocking import MODEL as ROCKING
 from rbfrag.vocabulary.quantities import SPECTRAL
 
@@ -68,7 +68,7 @@ ANY_RESTITUTION_SIGMA, ANY_EVEN = (0.05, 0.10), (0.0, 0.5, 1.0)
 """What they are chosen from where they are fitted as well."""
 
 PGV_PGA, SHARE = "(b) PGV, PGA", "(f) share of simulated overturns"
-FREE = "(f) the same, spread of e and part of even blocks fitted, too"
+ALL_FITTED = "(f) the same, spread of e and part of even blocks fitted, too"
 WEIGHTED = "(f) the same, all these distributions weighted by their likelihood"
 SHIPPED = "(g) shipped {}, best block"
 SHIPPED_OF_HOUSNER = "(g) the same, restitution by Housner"
@@ -90,9 +90,9 @@ def folds(base: Labels, seed: int, number: int = FOLDS) -> Labels:
 def held_out(predict: Predictor, failed: FloatArray, fold: Labels) -> FloatArray:
     """Return P of each test by a fit without its fold."""
     p = np.empty(failed.size)
-    for each in np.unique(fold):
-        own = fold == each
-        p[own] = predict(failed, ~own)[own]
+    for number in np.unique(fold):
+        in_fold = fold == number
+        p[in_fold] = predict(failed, ~in_fold)[in_fold]
     return p
 
 
@@ -168,7 +168,7 @@ def by_verdict(verdicts: Candidates) -> Predictor:
 
 
 def distributions(
-    free: FloatArray,
+    free_standing: FloatArray,
     spreads: Sequence[float] = (RESTITUTION_SIGMA,),
     parts: Sequence[float] = (EVEN,),
 ) -> Candidates:
@@ -178,11 +178,11 @@ def distributions(
     are equally likely. Settings are median of alpha [rad], its sigma of ln and mean restitution.
 
     Args:
-        free: 1 where overturned, shape (n, 3, alpha, restitution).
+        free_standing: 1 where overturned, shape (n, 3, alpha, restitution).
         spreads: sigmas of restitution.
         parts: parts of even blocks.
     """
-    even, uneven = free[:, 0], 0.5 * (free[:, 1] + free[:, 2])
+    even, uneven = free_standing[:, 0], 0.5 * (free_standing[:, 1] + free_standing[:, 2])
     settings, shares = [], []
     for sigma in SIGMA_LN:
         of_alpha = normal_weights(np.log(ALPHA_RAD), np.log(MEDIAN_RAD), sigma)
@@ -191,7 +191,7 @@ def distributions(
             for part in parts:
                 blocks = part * even + (1.0 - part) * uneven
                 share = np.einsum("ma,nae,re->mrn", of_alpha, blocks, of_e, optimize=True)
-                shares.append(share.reshape(-1, free.shape[0]))
+                shares.append(share.reshape(-1, free_standing.shape[0]))
                 settings += [(median, sigma, e) for median in MEDIAN_RAD for e in RESTITUTION]
     share = np.concatenate(shares)
     return Candidates(SURE + (1.0 - 2.0 * SURE) * share, np.array(settings))
@@ -233,21 +233,21 @@ def shipped_fragility(
         restitution: None for that of the rectangle.
     """
     measures = {name: trials.measured(name) for name in TERMS[model.term].inputs}
-    given = {"kr": np.tan(MEDIAN_RAD)[:, None], **measures}
-    shaking = dict(zip(given, np.broadcast_arrays(*given.values()), strict=True))
+    block_inputs = {"kr": np.tan(MEDIAN_RAD)[:, None], **measures}
+    shaking = dict(zip(block_inputs, np.broadcast_arrays(*block_inputs.values()), strict=True))
     p, settings = [], []
     for e in restitution:
-        asked = shaking if e is None else {**shaking, "restitution": e}
-        p.append(rbfrag.predict(kind=ROCKING.kind, p2=P2, model=model, **asked).probability)
+        inputs = shaking if e is None else {**shaking, "restitution": e}
+        p.append(rbfrag.predict(kind=ROCKING.kind, p2=P2, model=model, **inputs).probability)
         settings += [(alpha, np.nan, np.nan if e is None else e) for alpha in MEDIAN_RAD]
     return Candidates(np.concatenate(p), np.array(settings))
 
 
 def shipped_models() -> list[ModelRow]:
     """Return the shipped models of rocking whose measures a trace has, the best first."""
-    known = [*SPECTRAL.values(), "pgv_m_s", "pga_g"]
+    measures = [*SPECTRAL.values(), "pgv_m_s", "pga_g"]
     suited = (row for row in stored_rows(REFERENCE) if row.kind == ROCKING.kind)
-    readable = (row for row in suited if set(TERMS[row.term].inputs) <= set(known))
+    readable = (row for row in suited if set(TERMS[row.term].inputs) <= set(measures))
     return sorted(readable, key=held_out_loss)
 
 
@@ -255,14 +255,14 @@ def predictors(
     trials: Trials, runs: Outcomes, blocks: Candidates, shipped: Mapping[str, Candidates]
 ) -> dict[str, Predictor]:
     """Return the predictors by what they read."""
-    free, backed = overturned(runs.free), overturned(runs.backed)
+    free_standing, backed = overturned(runs.free_standing), overturned(runs.backed)
     pga, pgv = trials.pga_g, trials.pgv_m_s
     # leaning forward, backward, or either way
     leaning = np.concatenate([backed[:, 0], backed[:, 1], backed.max(axis=1)], axis=1).T
     backed_blocks = Candidates(leaning, np.empty((len(leaning), 0)))
-    even = free[:, 0].reshape(len(free), -1).T
+    even = free_standing[:, 0].reshape(len(free_standing), -1).T
     even_blocks = Candidates(even, np.empty((len(even), 0)))
-    any_blocks = distributions(free, ANY_RESTITUTION_SIGMA, ANY_EVEN)
+    any_blocks = distributions(free_standing, ANY_RESTITUTION_SIGMA, ANY_EVEN)
     return {
         "(a) PGA": logistic(pga),
         PGV_PGA: logistic(pgv, pga),
@@ -275,9 +275,9 @@ def predictors(
         "(e) rocking, best block: its verdict": best_of(even_blocks),
         "(e) the same, P of each verdict fitted": by_verdict(even_blocks),
         SHARE: best_of(blocks),
-        FREE: best_of(any_blocks),
+        ALL_FITTED: best_of(any_blocks),
         WEIGHTED: weighted(any_blocks),
-        **{name: best_of(each) for name, each in shipped.items()},
+        **{name: best_of(shipped_model) for name, shipped_model in shipped.items()},
     }
 
 
@@ -309,7 +309,7 @@ def difference_table(
 ) -> str:
     """Return the share's log loss and Brier score less those of each other predictor."""
     head = [f"{SHARE} less"]
-    head += [f"{name}: {what}" for name in SPECIMENS for what in ("log loss", "Brier")]
+    head += [f"{name}: {score}" for name in SPECIMENS for score in ("log loss", "Brier")]
     cells = []
     for other in predicted[0]:
         if other == SHARE:
@@ -332,7 +332,7 @@ def target_table(scores: Sequence[Mapping[str, Score]]) -> tuple[str, bool]:
         better = loss < of[PGV_PGA].log_loss[0]
         good = (loss <= LOG_LOSS[k], brier <= BRIER[k], better)
         reached &= all(good)
-        marks = ["" if each else " (missed)" for each in good]
+        marks = ["" if is_met else " (missed)" for is_met in good]
         cells.append(
             [str(k + 1), f"{loss:.3f}{marks[0]}", f"≤ {LOG_LOSS[k]:g}", f"{brier:.4f}{marks[1]}",
              f"≤ {BRIER[k]:g}", "yes" if better else "no (missed)"]
@@ -347,13 +347,17 @@ def block_table(predicted: Mapping[str, Candidates], failed: FloatArray, fold: L
     for name, blocks in predicted.items():
         for k, y in enumerate(failed):
             best = blocks.settings[blocks.best(y, np.ones(y.size, bool))]
-            each = [blocks.settings[blocks.best(y, fold != one)] for one in np.unique(fold)]
-            ranges = zip(best, np.min(each, axis=0), np.max(each, axis=0), strict=True)
+            best_settings = [
+                blocks.settings[blocks.best(y, fold != item)] for item in np.unique(fold)
+            ]
+            ranges = zip(
+                best, np.min(best_settings, axis=0), np.max(best_settings, axis=0), strict=True
+            )
             cells.append(
                 [name, str(k + 1)]
                 + [
-                    "" if np.isnan(one) else f"{one:.3g} ({low:.3g} to {high:.3g})"
-                    for one, low, high in ranges
+                    "" if np.isnan(item) else f"{item:.3g} ({low:.3g} to {high:.3g})"
+                    for item, low, high in ranges
                 ]
             )
     return markdown((head, cells))
@@ -364,10 +368,10 @@ def partition_table(trials: Trials, predict: Mapping[str, Predictor]) -> str:
     head = ["predictor", *SPECIMENS]
     divisions = [folds(trials.base, seed) for seed in range(SEED + 1, SEED + 1 + PARTITIONS)]
     cells = []
-    for name, one in predict.items():
+    for name, prediction in predict.items():
         line = [name]
         for failed in trials.overturned:
-            losses = [log_losses(held_out(one, failed, f), failed).mean() for f in divisions]
+            losses = [log_losses(held_out(prediction, failed, f), failed).mean() for f in divisions]
             line.append(f"{np.mean(losses):.3f} ({min(losses):.3f} to {max(losses):.3f})")
         cells.append(line)
     return markdown((head, cells))
@@ -376,7 +380,7 @@ def partition_table(trials: Trials, predict: Mapping[str, Predictor]) -> str:
 def study(trials: Trials, runs: Outcomes) -> tuple[str, bool]:
     """Return the tables, and whether the targets are reached."""
     base, fold = trials.base, folds(trials.base, SEED)
-    blocks = distributions(overturned(runs.free))
+    blocks = distributions(overturned(runs.free_standing))
     models = shipped_models()
     best = SHIPPED.format(models[0].name)
     shipped = {
@@ -386,7 +390,7 @@ def study(trials: Trials, runs: Outcomes) -> tuple[str, bool]:
     shipped[SHIPPED_OF_HOUSNER] = shipped_fragility(trials, models[0], [None])
     all_predictors = predictors(trials, runs, blocks, shipped)
     predicted = [
-        {name: held_out(one, failed, fold) for name, one in all_predictors.items()}
+        {name: held_out(prediction, failed, fold) for name, prediction in all_predictors.items()}
         for failed in trials.overturned
     ]
     scores = [
@@ -394,9 +398,9 @@ def study(trials: Trials, runs: Outcomes) -> tuple[str, bool]:
         for of, failed in zip(predicted, trials.overturned, strict=True)
     ]
     targets, reached = target_table(scores)
-    varied = {name: all_predictors[name] for name in (PGV_PGA, SHARE, FREE, WEIGHTED, best)}
+    varied = {name: all_predictors[name] for name in (PGV_PGA, SHARE, ALL_FITTED, WEIGHTED, best)}
     shares = " and ".join(f"{100.0 * failed.mean():.1f} %" for failed in trials.overturned)
-    decided = np.isin(runs.free, (STABLE, TOPPLED))
+    decided = np.isin(runs.free_standing, (STABLE, TOPPLED))
     text = [
         f"{base.size} tests of {np.unique(base).size} base records, {np.unique(fold).size} folds; "
         f"{shares} overturned. {decided.size + runs.backed.size:,} simulated runs, "

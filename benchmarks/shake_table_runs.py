@@ -27,7 +27,7 @@ from rbfrag.motions.toppling_spectrum import toppling_spectrum
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.solver import toppling_run
 from rbfrag.solver.excitation import excitation
-from rbfrag.solver.integrator.free_rocking import TOPPLED
+from rbfrag.solver.integrator.rocking_kernel import TOPPLED
 from rbfrag.solver.integrator.state import corner
 from rbfrag.solver.results import NUMERICS_VERSION
 from rbfrag.solver.rocking_run import FreeBlock, simulate
@@ -145,12 +145,12 @@ class Outcomes:
     """What single blocks do: outcome codes of the kernels.
 
     Args:
-        free: rocking blocks: even; uneven, weaker forward; uneven, weaker backward; shape
+        free_standing: rocking blocks: even; uneven, weaker forward; uneven, weaker backward; shape
             (n, 3, alpha, restitution).
         backed: toppling blocks: leaning forward, backward; shape (n, 2, alpha).
     """
 
-    free: Codes
+    free_standing: Codes
     backed: Codes
 
 
@@ -162,9 +162,9 @@ def outcomes(trials: Trials, *, work: Path | None = None, workers: int = 1) -> O
         work: folder that keeps the outcomes for the next time.
         workers: processes.
     """
-    kept = None if work is None else work / f"outcomes-{trials.digest}.npz"
-    if kept is not None and kept.is_file():
-        with np.load(kept) as stored:
+    stored_file = None if work is None else work / f"outcomes-{trials.digest}.npz"
+    if stored_file is not None and stored_file.is_file():
+        with np.load(stored_file) as stored:
             return Outcomes(stored["free"], stored["backed"])
     samples = [motion.acceleration_g for motion in trials.motions]
     if workers == 1:
@@ -174,12 +174,14 @@ def outcomes(trials: Trials, *, work: Path | None = None, workers: int = 1) -> O
         run_blocks(samples[0][:4])
         with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
             runs = _counted(pool.map(run_blocks, samples), len(samples))
-    result = Outcomes(np.array([free for free, _ in runs]), np.array([back for _, back in runs]))
-    if kept is not None:
-        kept.parent.mkdir(parents=True, exist_ok=True)
-        partial = kept.with_suffix(".partial.npz")
-        np.savez_compressed(partial, free=result.free, backed=result.backed)
-        partial.replace(kept)
+    result = Outcomes(
+        np.array([free_standing for free_standing, _ in runs]), np.array([back for _, back in runs])
+    )
+    if stored_file is not None:
+        stored_file.parent.mkdir(parents=True, exist_ok=True)
+        partial = stored_file.with_suffix(".partial.npz")
+        np.savez_compressed(partial, free=result.free_standing, backed=result.backed)
+        partial.replace(stored_file)
     return result
 
 
@@ -199,18 +201,18 @@ def run_blocks(acceleration_g: FloatArray) -> tuple[Codes, Codes]:
     """
     motion = GroundMotion(acceleration_g, DECIMATION / RATE_HZ)
     ways = [excitation(motion, None, way) for way in ("forward", "reverse")]
-    free = np.empty((3, ALPHA_RAD.size, RESTITUTION.size), np.int8)
+    free_standing = np.empty((3, ALPHA_RAD.size, RESTITUTION.size), np.int8)
     backed = np.empty((2, ALPHA_RAD.size), np.int8)
     for i, alpha in enumerate(ALPHA_RAD.tolist()):
         kr, other = math.tan(alpha), math.tan(OTHER_SENSE * alpha)
         for j, e in enumerate(RESTITUTION.tolist()):
             even, uneven = free_block(kr, kr, e), free_block(kr, other, e)
-            free[0, i, j] = simulate(ways[0], even).outcome
-            free[1, i, j] = simulate(ways[0], uneven).outcome
-            free[2, i, j] = simulate(ways[1], uneven).outcome
+            free_standing[0, i, j] = simulate(ways[0], even).outcome
+            free_standing[1, i, j] = simulate(ways[0], uneven).outcome
+            free_standing[2, i, j] = simulate(ways[1], uneven).outcome
         for k, way in enumerate(ways):
             backed[k, i] = toppling_run.simulate(way, p2=P2, kr=kr).outcome
-    return free, backed
+    return free_standing, backed
 
 
 def free_block(forward_kr: float, backward_kr: float, e: float) -> FreeBlock:

@@ -19,7 +19,7 @@ from benchmarks.damage import NUMBER
 from rbfrag.errors import RbfragError
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.readers import read_motions
-from tests.motions.test_header_check import MAKE, MISTAKES, made
+from tests.motions.test_header_check import MAKE, MISTAKES, file_text
 
 HEADER_BYTES = 6000
 """So far down a file its numbers are changed; single samples among them do not count."""
@@ -42,9 +42,13 @@ class Silence:
     lines: Counter[str] = field(default_factory=Counter)
 
 
-def sound_files(name: str, found: list[bytes]) -> list[bytes]:
+def sound_files(name: str, files: list[bytes]) -> list[bytes]:
     """Return files of a format whose header numbers can be changed: shaking, if it can be made."""
-    return [made(each).encode() for each in MAKE if each.removesuffix(" series") == name] or found
+    return [
+        file_text(name_of_maker).encode()
+        for name_of_maker in MAKE
+        if name_of_maker.removesuffix(" series") == name
+    ] or files
 
 
 def change(
@@ -62,14 +66,14 @@ def change(
         What became of it (``""`` for nothing, ``rejected``, ``remarked``, ``silent``), the kind of
         number, and its line.
     """
-    found = list(NUMBER.finditer(content[:HEADER_BYTES]))
-    if not found:
+    numbers = list(NUMBER.finditer(content[:HEADER_BYTES]))
+    if not numbers:
         return "", "", ""
-    stated = _statements(name, content)
-    of_samples = [match for match in found if match.start() in stated]
+    statements = _statements(name, content)
+    of_samples = [match for match in numbers if match.start() in statements]
     # most numbers of a header say nothing of the samples
-    match = random.choice(of_samples if of_samples and random.random() < 0.5 else found)
-    kind = stated.get(match.start(), OTHER)
+    match = random.choice(of_samples if of_samples and random.random() < 0.5 else numbers)
+    kind = statements.get(match.start(), OTHER)
     other = _by_a_factor(match[0], random)
     if other is None:
         return "", "", ""
@@ -80,7 +84,7 @@ def change(
         start -= max(0, min(len(other) - len(match[0]), blanks - 1))
     damaged = content[:start] + other + content[match.end() :]
     path.write_bytes(content)
-    whole = read_motions(path, units=units, dt_s=dt_s, gain=gain)
+    sound = read_motions(path, units=units, dt_s=dt_s, gain=gain)
     path.write_bytes(damaged)
     at = content.count(b"\n", 0, match.start())
     line = damaged.split(b"\n")[at].decode("latin-1").strip()
@@ -90,13 +94,13 @@ def change(
         return "rejected", kind, line
     finally:
         path.unlink()
-    if kind == OTHER and _alike(whole, motions):
+    if kind == OTHER and _alike(sound, motions):
         return "", kind, line
-    told = {each for motion in motions for each in motion.remarks}
-    told -= {each for motion in whole for each in motion.remarks}
+    remarks = {remark for motion in motions for remark in motion.remarks}
+    remarks -= {remark for motion in sound for remark in motion.remarks}
     # the offset of a format that subtracts it is told in numbers
-    told = {each for each in told if not each.startswith("the mean of")}
-    return ("remarked" if told else "silent"), kind, line
+    remarks = {remark for remark in remarks if not remark.startswith("the mean of")}
+    return ("remarked" if remarks else "silent"), kind, line
 
 
 def _by_a_factor(number: bytes, random: Random) -> bytes | None:
@@ -112,30 +116,30 @@ def _by_a_factor(number: bytes, random: Random) -> bytes | None:
 def _statements(name: str, content: bytes) -> dict[int, str]:
     """Where the format's statements on its samples stand, and of what kind they are."""
     text = content[:HEADER_BYTES].decode("latin-1")
-    found = {}
-    for each, mistakes in MISTAKES.items():
-        if each.removesuffix(" series") == name:
+    statements = {}
+    for statement, mistakes in MISTAKES.items():
+        if statement.removesuffix(" series") == name:
             for kind, pattern, _ in mistakes:
                 for match in re.finditer(pattern, text, re.IGNORECASE):
                     number = NUMBER.search(match[1].encode("latin-1"))
                     if number:
-                        found[match.start(1) + number.start()] = kind
-    return found
+                        statements[match.start(1) + number.start()] = kind
+    return statements
 
 
-def _alike(whole: list[GroundMotion], motions: list[GroundMotion]) -> bool:
+def _alike(sound: list[GroundMotion], motions: list[GroundMotion]) -> bool:
     """Whether motions were read alike, but for single samples and an offset."""
-    if len(whole) != len(motions):
+    if len(sound) != len(motions):
         return False
-    for one, other in zip(whole, motions, strict=True):
-        if one.npts != other.npts or one.dt_s != other.dt_s:
+    for before, other in zip(sound, motions, strict=True):
+        if before.npts != other.npts or before.dt_s != other.dt_s:
             return False
-        steps, now = np.diff(one.acceleration_g), np.diff(other.acceleration_g)
+        steps, now = np.diff(before.acceleration_g), np.diff(other.acceleration_g)
         largest = np.abs(steps).max(initial=0.0)
         moving = np.abs(steps) > 1e-3 * largest
         if not moving.any():
             # equal samples: no step tells a factor
-            differ = one.acceleration_g != other.acceleration_g
+            differ = before.acceleration_g != other.acceleration_g
         else:
             differ = np.abs(steps - now)[moving] > 1e-6 * largest
         if np.mean(differ) > 0.5:
@@ -147,14 +151,15 @@ def table(silences: dict[str, Silence]) -> str:
     """Return what became of the changed numbers, a row a format, and the lines of silent ones."""
     rows = ["| format | header numbers changed | rejected | remarked | silent |",
             "| --- | --- | --- | --- | --- |"]  # fmt: skip
-    for name, each in silences.items():
-        kinds = ", ".join(f"{number} {kind}" for kind, number in sorted(each.silent.items()))
+    for name, silence in silences.items():
+        kinds = ", ".join(f"{number} {kind}" for kind, number in sorted(silence.silent.items()))
         rows.append(
-            f"| {name} | {each.changed} | {each.rejected} | {each.remarked} | {kinds or 0} |"
+            f"| {name} | {silence.changed} | {silence.rejected} | {silence.remarked} "
+            f"| {kinds or 0} |"
         )
     silent = [
         f"{name}: {line[:100]}"
-        for name, each in silences.items()
-        for line, _ in each.lines.most_common(3)
+        for name, silence in silences.items()
+        for line, _ in silence.lines.most_common(3)
     ]
     return "\n".join([*rows, *(["", "Silent, for example:", *silent] if silent else [])])

@@ -6,7 +6,8 @@ without the earthquake concerned, on the same measures.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import math
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -14,14 +15,107 @@ from numpy.typing import NDArray
 from scipy.special import ndtr
 
 from benchmarks.page import markdown
-from benchmarks.published_slides import KY_G, PUBLISHED, Published
-from rbfrag.fragility.fit.clusters import left_out
-from rbfrag.fragility.fit.critical import most_likely
 from rbfrag.fragility.fit.data import KR, LEAST_DISPLACEMENT_M, FitSource
 from rbfrag.fragility.fit.likelihood import CensoredNormal, Standardised
-from rbfrag.fragility.fit.scores import CLIP, brier, calibration, log_loss
+from rbfrag.fragility.fit.maximum_likelihood import most_likely
+from rbfrag.fragility.fit.result import CLIP, brier, calibration, left_out, log_loss
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.solver.models.sliding import THRESHOLDS_M
+
+FloatArray = NDArray[np.float64]
+Values = Mapping[str, FloatArray]
+
+_LN_CM, _LN_10 = math.log(0.01), math.log(10.0)
+
+KY_G = (0.05, 0.30)
+"""Yield accelerations that Saygili & Rathje simulated [g]; Jibson's are like them."""
+
+
+@dataclass(frozen=True)
+class Published:
+    """One regression.
+
+    Args:
+        name: authors, year and equation.
+        predictors: what it reads beside the yield acceleration, of `pga_g`, `pgv_m_s`,
+            `arias_m_s`, `magnitude`.
+        median: ln of the median displacement [ln m].
+        sigma: standard deviation of ln D.
+    """
+
+    name: str
+    predictors: tuple[str, ...]
+    median: Callable[[Values], FloatArray]
+    sigma: Callable[[Values], FloatArray]
+
+
+def _ratio(v: Values) -> FloatArray:
+    return v["ky"] / v["pga_g"]
+
+
+def _quartic(v: Values, *a: float) -> FloatArray:
+    return _LN_CM + np.polynomial.polynomial.polyval(_ratio(v), a)
+
+
+def _power(v: Values, constant: float, rising: float, falling: float) -> FloatArray:
+    """Return ln D of log10 D [cm] = constant + log10((1 - r)^rising r^falling)."""
+    r = _ratio(v)
+    return _LN_CM + _LN_10 * constant + rising * np.log(1.0 - r) + falling * np.log(r)
+
+
+def _log10(value: float) -> Callable[[Values], FloatArray]:
+    return lambda v: np.full_like(v["ky"], value * _LN_10)
+
+
+PUBLISHED = (
+    Published(
+        "Jibson (2007), eq. 6", ("pga_g",),
+        lambda v: _power(v, 0.215, 2.341, -1.438), _log10(0.510),
+    ),
+    Published(
+        "Saygili & Rathje (2008)", ("pga_g",),
+        lambda v: _quartic(v, 5.52, -4.43, -20.39, 42.61, -28.74) + 0.72 * np.log(v["pga_g"]),
+        lambda v: np.full_like(v["ky"], 1.13),
+    ),
+    Published(
+        "Jibson (2007), eq. 7", ("pga_g", "magnitude"),
+        lambda v: _power(v, -2.710, 2.335, -1.478) + _LN_10 * 0.424 * v["magnitude"],
+        _log10(0.454),
+    ),
+    Published(
+        "Rathje & Saygili (2009)", ("pga_g", "magnitude"),
+        lambda v: _quartic(v, 4.89, -4.85, -19.64, 42.49, -29.06)
+        + 0.72 * np.log(v["pga_g"]) + 0.89 * (v["magnitude"] - 6.0),
+        lambda v: 0.73 + 0.789 * _ratio(v) - 0.539 * _ratio(v) ** 2,
+    ),
+    Published(
+        "Jibson (2007), eq. 9", ("arias_m_s",),
+        lambda v: _LN_CM + 2.401 * np.log(v["arias_m_s"]) - 3.481 * np.log(v["ky"])
+        - 3.230 * _LN_10,
+        _log10(0.656),
+    ),
+    Published(
+        "Jibson (2007), eq. 10", ("pga_g", "arias_m_s"),
+        lambda v: _LN_CM + 0.561 * np.log(v["arias_m_s"]) - 3.833 * np.log(_ratio(v))
+        - 1.474 * _LN_10,
+        _log10(0.616),
+    ),
+    Published(
+        "Saygili & Rathje (2008)", ("pga_g", "pgv_m_s"),
+        lambda v: _quartic(v, -1.56, -4.58, -20.84, 44.75, -30.50)
+        - 0.64 * np.log(v["pga_g"]) + 1.55 * np.log(100.0 * v["pgv_m_s"]),
+        lambda v: 0.405 + 0.524 * _ratio(v),
+    ),
+    Published(
+        "Saygili & Rathje (2008)", ("pga_g", "pgv_m_s", "arias_m_s"),
+        lambda v: _quartic(v, -0.74, -4.93, -19.91, 43.75, -30.12)
+        - 1.30 * np.log(v["pga_g"]) + 1.04 * np.log(100.0 * v["pgv_m_s"])
+        + 0.67 * np.log(v["arias_m_s"]),
+        lambda v: 0.20 + 0.79 * _ratio(v),
+    ),
+)  # fmt: skip
+"""The regressions by what they read."""
+
 
 FloatArray = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -81,17 +175,17 @@ def columns_of(predictors: Sequence[str], v: Mapping[str, FloatArray]) -> FloatA
     With PGV they are those of the method `displacement`; without, strength, 1 - r and the measures
     have a power each.
     """
-    ky, one = v["ky"], np.ones_like(v["ky"])
+    ky, ones = v["ky"], np.ones_like(v["ky"])
     if "pga_g" not in predictors:
-        return np.column_stack([one, np.log(ky), *(np.log(v[name]) for name in predictors)])
-    left = np.log(1.0 - ky / v["pga_g"])
+        return np.column_stack([ones, np.log(ky), *(np.log(v[name]) for name in predictors)])
+    ln_rest = np.log(1.0 - ky / v["pga_g"])
     if "pgv_m_s" in predictors:
         size = np.log(v["pgv_m_s"] ** 2 / (ky * STANDARD_GRAVITY_M_S2))
-        columns = [one, size, left]
+        columns = [ones, size, ln_rest]
         if "arias_m_s" in predictors:
             columns += [np.log(v["arias_m_s"] / v["pgv_m_s"] ** 2)]
         return np.column_stack(columns)
-    columns = [one, np.log(ky / v["pga_g"]), left, np.log(v["pga_g"])]
+    columns = [ones, np.log(ky / v["pga_g"]), ln_rest, np.log(v["pga_g"])]
     columns += [np.log(v["arias_m_s"])] if "arias_m_s" in predictors else []
     columns += [v["magnitude"] - 6.0] if "magnitude" in predictors else []
     return np.column_stack(columns)
@@ -112,15 +206,18 @@ def held_out(predictors: Sequence[str], slides: Slides) -> tuple[FloatArray, Flo
         slopes = [*(values["columns"].T * per), *(-eta * values["scatter"].T)]
         return eta, log_sigma, slopes, [*([0.0] * k), *values["scatter"].T]
 
-    found = slides.displacement_m >= LEAST_DISPLACEMENT_M
+    is_displaced = slides.displacement_m >= LEAST_DISPLACEMENT_M
     values = {"columns": columns, "scatter": scatter, "y": y}
-    rows = CensoredNormal(formula, values, found, slides.event)
-    start = np.linalg.lstsq(columns[found], y[found], rcond=None)[0]
+    rows = CensoredNormal(formula, values, is_displaced, slides.event)
+    start = np.linalg.lstsq(columns[is_displaced], y[is_displaced], rcond=None)[0]
     start = most_likely(rows, np.concatenate([start, [-0.3], np.zeros(scatter.shape[1] - 1)]))
     median, sigma = np.empty(y.size), np.empty(y.size)
     for event, b in left_out(rows.event, lambda rest: most_likely(rows.only(rest), start)).items():
-        own = slides.event == event
-        median[own], sigma[own] = columns[own] @ b[:k], np.exp(scatter[own] @ b[k:])
+        of_event = slides.event == event
+        median[of_event], sigma[of_event] = (
+            columns[of_event] @ b[:k],
+            np.exp(scatter[of_event] @ b[k:]),
+        )
     return median, sigma
 
 
@@ -141,9 +238,9 @@ class Scored:
     @classmethod
     def of(cls, median: FloatArray, sigma: FloatArray, slides: Slides) -> Scored:
         """Score a model against what blocks did."""
-        asked = np.array(THRESHOLDS_M)
-        p = ndtr((median[:, None] - np.log(asked)) / sigma[:, None])
-        failed = (slides.displacement_m[:, None] > asked).astype(np.float64)
+        thresholds_m = np.array(THRESHOLDS_M)
+        p = ndtr((median[:, None] - np.log(thresholds_m)) / sigma[:, None])
+        failed = (slides.displacement_m[:, None] > thresholds_m).astype(np.float64)
         far = slides.displacement_m >= LEAST_DISPLACEMENT_M
         return cls(p, failed, np.log(slides.displacement_m[far]) - median[far])
 
@@ -155,9 +252,9 @@ class Scored:
 
     def cells(self) -> list[str]:
         """Return log loss, Brier score, slope, bias and sigma of ln D."""
-        known = np.ones(self.failed.shape, dtype=bool)
-        scores = [each(self.probability, self.failed, known) for each in (log_loss, brier)]
-        slope = calibration(self.probability, self.failed, known).slope
+        is_known = np.ones(self.failed.shape, dtype=bool)
+        scores = [score(self.probability, self.failed, is_known) for score in (log_loss, brier)]
+        slope = calibration(self.probability, self.failed, is_known).slope
         return [
             *(f"{value:.3f}" for value in scores),
             f"{slope:.2f}",
@@ -188,13 +285,15 @@ def comparison(source: FitSource, *, facing: str) -> str:
     rows, ours_of = [], {}
     for published in PUBLISHED:
         names = published.predictors
-        known = np.logical_and.reduce([np.isfinite(every.values[name]) for name in names])
-        asked = known & _in_range(every) if facing == "either" else known
-        slides = every.only(asked)
+        is_known = np.logical_and.reduce([np.isfinite(every.values[name]) for name in names])
+        in_range = is_known & _in_range(every) if facing == "either" else is_known
+        slides = every.only(in_range)
         if names not in ours_of:
-            fitted = every.only(known)
+            fitted = every.only(is_known)
             median, sigma = held_out(names, fitted)
-            ours_of[names] = Scored.of(median[asked[known]], sigma[asked[known]], slides)
+            ours_of[names] = Scored.of(
+                median[in_range[is_known]], sigma[in_range[is_known]], slides
+            )
         theirs = Scored.of(published.median(slides.values), published.sigma(slides.values), slides)
         rows.append((published, theirs, ours_of[names], slides))
     return _table(rows)

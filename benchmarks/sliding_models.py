@@ -26,12 +26,12 @@ from rbfrag.fragility.fit.data import read_source
 from rbfrag.fragility.methods import method_named
 
 
-def score_table(found: Mapping[str, Predicted]) -> str:
+def score_table(predictions: Mapping[str, Predicted]) -> str:
     """Return log loss, slope and intercepts of the models, best first."""
     cells = [
-        [f"`{name}`", measures_cell(name), loss_cell(one), f"{one.slope[0]:.2f}",
-         *(f"{value:+.2f}" for value in one.intercepts)]
-        for name, one in sorted(found.items(), key=lambda item: item[1].loss)
+        [f"`{name}`", measures_cell(name), loss_cell(prediction), f"{prediction.slope[0]:.2f}",
+         *(f"{value:+.2f}" for value in prediction.intercepts)]
+        for name, prediction in sorted(predictions.items(), key=lambda item: item[1].loss)
     ]  # fmt: skip
     classes = [words for words, *_ in magnitude_classes()]
     return markdown((["model", "reads", "log loss", "slope", *classes], cells))
@@ -47,7 +47,7 @@ def main(arguments: list[str] | None = None) -> None:
         source = read_source(connection, method_named("displacement").block)
     models = {name: aims for name, aims in MODELS.items() if aims.kind == "sliding"}
     tables = {
-        "sliding-scores": score_table({n: predicted(source, one) for n, one in models.items()}),
+        "sliding-scores": score_table({n: predicted(source, aims) for n, aims in models.items()}),
         "sliding-one": comparison(source, facing="one"),
         "sliding-either": comparison(source, facing="either"),
     }

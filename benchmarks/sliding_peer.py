@@ -38,8 +38,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     options = parser(__doc__)
     options.add_argument("--most", type=int, default=18, help="records to compare")
     chosen = options.parse_args(arguments)
-    found = find_records(chosen.records)
-    motions = [motion for motion in found.motions if motion.dt_s is not None][: chosen.most]
+    records = find_records(chosen.records)
+    motions = [motion for motion in records.motions if motion.dt_s is not None][: chosen.most]
     errors: dict[int, list[float]] = {fine: [] for fine in REFINED}
     beyond: dict[int, list[float]] = {fine: [] for fine in REFINED}
     for motion in motions:
@@ -66,7 +66,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
     ]
     headers = ["samples", "cases", "median difference", "greatest", "beyond creep"]
     text = markdown((headers, cells))
-    text += f"\n\n{len(motions)} records, k_y/PGA of {', '.join(map(str, YIELDS))}; {found.source}."
+    text += (
+        f"\n\n{len(motions)} records, k_y/PGA of {', '.join(map(str, YIELDS))}; {records.source}."
+    )
     report("sliding-peer", text, write=chosen.write, page=PAGE)
 
 

@@ -6,9 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from benchmarks.claims.claim import IntArray, cluster_interval
+from benchmarks.claims.claim import IntArray, agreement_with_reference, cluster_interval
 from benchmarks.page import ROOT, markdown, parser, report
-from benchmarks.reference_agreement import agreement_with_reference
 from rbfrag.db.engine import opened_database
 from rbfrag.db.motions import load_motion
 from rbfrag.db.queries import combination_table
@@ -31,30 +30,32 @@ def main(arguments: Sequence[str] | None = None) -> None:
             for motion, p2, polarity in zip(table.motion_id, table.p2, table.polarity, strict=True)
         ]
     )
-    found = (table.status == "found") & (x > 0.0)
-    event, p2 = table.event_id[found].astype(str), table.p2[found]
-    ln_y = np.log(table.y_m_s[found])
-    to_x, to_pgv = ln_y - np.log(x[found]), ln_y - np.log(table.pgv_m_s[found])
+    is_found = (table.status == "found") & (x > 0.0)
+    event, p2 = table.event_id[is_found].astype(str), table.p2[is_found]
+    ln_y = np.log(table.y_m_s[is_found])
+    to_x, to_pgv = ln_y - np.log(x[is_found]), ln_y - np.log(table.pgv_m_s[is_found])
     rows = []
-    for words, here in [
+    for words, in_class in [
         *((f"{size:g}", p2 == size) for size in sorted(set(p2), reverse=True)),
         ("all", np.ones(p2.size, dtype=bool)),
     ]:
 
-        def gain(i: IntArray, here: np.ndarray = here) -> float:
-            return float(np.std(to_pgv[here][i]) - np.std(to_x[here][i]))
+        def gain(i: IntArray, in_class: np.ndarray = in_class) -> float:
+            return float(np.std(to_pgv[in_class][i]) - np.std(to_x[in_class][i]))
 
-        value, low, high = cluster_interval(event[here], gain, seed=chosen.seed, replications=500)
+        value, low, high = cluster_interval(
+            event[in_class], gain, seed=chosen.seed, replications=500
+        )
         rows.append(
             [
                 words,
-                str(int(here.sum())),
-                f"{np.exp(np.median(to_pgv[here])):.3f}",
-                f"{np.exp(np.median(to_x[here])):.3f}",
-                f"{np.std(to_pgv[here]):.3f}",
-                f"{np.std(to_x[here]):.3f}",
+                str(int(in_class.sum())),
+                f"{np.exp(np.median(to_pgv[in_class])):.3f}",
+                f"{np.exp(np.median(to_x[in_class])):.3f}",
+                f"{np.std(to_pgv[in_class]):.3f}",
+                f"{np.std(to_x[in_class]):.3f}",
                 f"{value:.3f} ({low:.3f} … {high:.3f})",
-                f"{100.0 * np.mean(to_x[here] > np.log(0.99)):.0f} %",
+                f"{100.0 * np.mean(to_x[in_class] > np.log(0.99)):.0f} %",
             ]
         )
     headers = [
@@ -62,7 +63,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         "difference (95 %)", "y within 1 % of X",
     ]  # fmt: skip
     about = (
-        f"{int(found.sum())} critical values of {len(motions)} motions, "
+        f"{int(is_found.sum())} critical values of {len(motions)} motions, "
         f"{len(set(event))} earthquakes; intervals draw whole earthquakes, seed {chosen.seed}. "
         f"{agreement_with_reference(chosen.db)}"
     )

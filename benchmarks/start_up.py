@@ -12,15 +12,18 @@ from functools import partial
 from statistics import median
 
 from benchmarks.page import ROOT, markdown, parser, report
-from rbfrag.bench.timing import seconds
+from rbfrag.bench.work_precision import seconds
 
-PULSE = "from rbfrag.motions.pulses import reversal_pulse; m = reversal_pulse(0.4, 0.5, 1.0, 0.005)"
+PULSE = (
+    "from rbfrag.motions.sample_motions import reversal_pulse; "
+    "m = reversal_pulse(0.4, 0.5, 1.0, 0.005)"
+)
 RESPOND = f"from rbfrag.solver.toppling_run import respond; {PULSE}; respond(m, p2=3, kr=0.1)"
 CRITICAL = f"from rbfrag.solver.search.critical import critical; {PULSE}; critical(m, p2=3)"
 SIMULATE = f"""
 import os, tempfile
 import rbfrag
-from rbfrag.motions.export import export_motions
+from rbfrag.motions.readers import export_motions
 {PULSE}
 os.chdir(tempfile.mkdtemp())
 export_motions([m], "pulse.csv")
@@ -93,8 +96,8 @@ def shell(repeat: int) -> list[list[str]]:
             times[name].append(processor_time(run))
     typer = median(times[TYPER][1:])
     return [
-        [name, seconds(median(each[1:])), seconds(min(each)), f"{median(each[1:]) / typer:.2f}"]
-        for name, each in times.items()
+        [name, seconds(median(runs[1:])), seconds(min(runs)), f"{median(runs[1:]) / typer:.2f}"]
+        for name, runs in times.items()
     ]
 
 

@@ -9,8 +9,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from benchmarks.page import ROOT, find_records, markdown, parser, report
-from rbfrag.bench.cases import Records
-from rbfrag.bench.timing import spread, timed
+from rbfrag.bench.peers import Records
+from rbfrag.bench.work_precision import spread, timed
 from rbfrag.motions.polarity import POLARITIES
 from rbfrag.motions.toppling_spectrum import toppling_spectrum
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
@@ -50,8 +50,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
 def bounds(records: Records, p2: Sequence[float]) -> list[list[str]]:
     """Compare X with the greatest k_r of a failing excursion from rest, linear and non-linear."""
     wrong, linear, strengths, apart = 0, 0, [], []
-    for done, motion in enumerate(records.motions):
-        print(f"bounds: {done}/{len(records.motions)} motions", file=sys.stderr)
+    for count, motion in enumerate(records.motions):
+        print(f"bounds: {count}/{len(records.motions)} motions", file=sys.stderr)
         for polarity in POLARITIES:
             excited = excitation(motion, None, polarity)
             for size in p2:
@@ -91,7 +91,7 @@ def trials(records: Records, number: int, seed: int) -> list[list[str]]:
     """Run blocks a little above the bound of motions, polarities and sizes drawn at random."""
     rng = np.random.default_rng(seed)
     low, high = math.log(min(DEFAULT_P2)), math.log(max(DEFAULT_P2))
-    made = toppled = just_below = 0
+    trials_made = toppled = just_below = 0
     per_motion = -(-number // (2 * len(records.motions)))
     for motion in records.motions:
         for polarity in POLARITIES:
@@ -104,11 +104,11 @@ def trials(records: Records, number: int, seed: int) -> list[list[str]]:
                 factor = math.exp(rng.uniform(*map(math.log, ABOVE)))
                 toppled += run(factor * k).outcome == TOPPLED
                 just_below += run(0.98 * k).outcome == TOPPLED
-                made += 1
+                trials_made += 1
     return [
         [
             f"no block with $k_r\\,g/p$ from {ABOVE[0]:g} to {ABOVE[1]:g} $X(p)$ topples",
-            f"{made} runs, $p^2$ from {min(DEFAULT_P2):g} to {max(DEFAULT_P2):g}",
+            f"{trials_made} runs, $p^2$ from {min(DEFAULT_P2):g} to {max(DEFAULT_P2):g}",
             f"{toppled} toppled (of as many at .98 $X$: {just_below})",
         ]
     ]
@@ -119,9 +119,9 @@ def cost(records: Records) -> list[list[str]]:
     ratios = []
     toppling_spectrum(records.motions[0], SIZES)  # what it needs is loaded once
     for motion in records.motions[:: max(1, len(records.motions) // 40)]:
-        _, whole = timed(lambda motion=motion: toppling_spectrum(motion, SIZES))  # type: ignore[misc]
+        _, seconds = timed(lambda motion=motion: toppling_spectrum(motion, SIZES))  # type: ignore[misc]
         _, once = timed(lambda motion=motion: np.cumsum(motion.acceleration_g))  # type: ignore[misc]
-        ratios.append(whole / (SIZES.size * once))
+        ratios.append(seconds / (SIZES.size * once))
     middle, _, high = spread(ratios)
     return [
         [

@@ -88,7 +88,7 @@ def recorded(folders: Sequence[Path]) -> str:
         for motion in find_records(folder).motions
         if motion.pga_g >= STRONG_G
     }
-    found = certified = narrow = 0
+    with_value = certified = narrow = 0
     worst = 0.0
     wide = []
     for motion in by_samples.values():
@@ -97,7 +97,7 @@ def recorded(folders: Sequence[Path]) -> str:
                 answer = critical(motion, p2=p2, polarity=polarity)
                 if answer.lower is None or answer.upper is None:
                     continue
-                found += 1
+                with_value += 1
                 if answer.certified:
                     certified += 1
                     continue
@@ -112,7 +112,7 @@ def recorded(folders: Sequence[Path]) -> str:
     table = (
         "| recorded motions with PGA ≥ 1 g | critical value found | certified | not certified, at "
         "most 2 % wide | wider | most hidden |\n| --- | --- | --- | --- | --- | --- |\n"
-        f"| {len(by_samples)} | {found} | {certified} | {narrow} | {len(wide)} | {worst:.2%} |"
+        f"| {len(by_samples)} | {with_value} | {certified} | {narrow} | {len(wide)} | {worst:.2%} |"
     )
     return "\n".join([table, *(["", *wide] if wide else [])])
 

@@ -72,14 +72,14 @@ class Session:
 
     def answer(self, folder: Path) -> str:
         """Return what the program prints."""
-        done = subprocess.run(
+        process = subprocess.run(
             [sys.executable, "-m", "rbfrag.cli.main", *self.words[1:]],
             cwd=folder, capture_output=True, text=True, check=False,
             env={**os.environ, "RBFRAG_DB": "", "COLUMNS": "100"},
         )  # fmt: skip
-        if done.returncode != 0:
-            raise RuntimeError(f"{self.page}: {self.typed}\n{done.stderr}")
-        return "\n".join(line.rstrip() for line in done.stdout.splitlines()).strip()
+        if process.returncode != 0:
+            raise RuntimeError(f"{self.page}: {self.typed}\n{process.stderr}")
+        return "\n".join(line.rstrip() for line in process.stdout.splitlines()).strip()
 
     def agrees(self, answer: str) -> bool:
         """Return whether the page prints this answer, but for what it leaves out."""

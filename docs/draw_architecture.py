@@ -34,7 +34,7 @@ for name, module in sorted(sys.modules.items()):
         print("loaded", name.replace(".", "/") + ".py")
 """
 
-BESIDE = {"rbfrag", "errors", "files", "frames", "version", "migrations"}
+BESIDE = {"rbfrag", "errors", "files", "frames", "threads", "version", "migrations"}
 """What the figure leaves out: the public face, what everybody may import, the schema's steps."""
 
 UNNAMED = {"rbfrag"}
@@ -128,10 +128,10 @@ def package_graph(graph: Graph) -> dict[str, set[str]]:
     """Return the packages of rbfrag that each package imports."""
     packages: dict[str, set[str]] = {}
     for name, targets in graph.items():
-        own = _package(name)
-        if own not in BESIDE:
-            others = {_package(target) for target in targets}
-            packages.setdefault(own, set()).update(others - BESIDE - {own})
+        package = _package(name)
+        if package not in BESIDE:
+            targets_of_package = {_package(target) for target in targets}
+            packages.setdefault(package, set()).update(targets_of_package - BESIDE - {package})
     return packages
 
 
@@ -185,9 +185,9 @@ def drawn() -> str:
         below = {
             name: [place[target][0] for source, target in edges if source == name] for name in row
         }
-        wanted = {name: sum(x) / len(x) if x else 0.5 * WIDTH for name, x in below.items()}
-        middle = wanted[row[0]] if len(row) == 1 else 0.5 * WIDTH
-        for i, name in enumerate(sorted(row, key=lambda name: (wanted[name], name))):
+        centres = {name: sum(x) / len(x) if x else 0.5 * WIDTH for name, x in below.items()}
+        middle = centres[row[0]] if len(row) == 1 else 0.5 * WIDTH
+        for i, name in enumerate(sorted(row, key=lambda name: (centres[name], name))):
             place[name] = (
                 middle + (i - 0.5 * (len(row) - 1)) * (BOX_WIDTH + GAP),
                 16 + (len(rows) - 1 - level) * ROW,
@@ -260,7 +260,7 @@ def loaded() -> list[str]:
     environment.pop("RBFRAG_DB", None)
     # in an empty folder the shipped reference answers
     with tempfile.TemporaryDirectory() as folder:
-        asked = subprocess.run(
+        process = subprocess.run(
             [sys.executable, "-c", ASK],
             cwd=folder,
             env=environment,
@@ -268,7 +268,7 @@ def loaded() -> list[str]:
             text=True,
             check=True,
         )
-    return [line.split()[1] for line in asked.stdout.splitlines() if line.startswith("loaded ")]
+    return [line.split()[1] for line in process.stdout.splitlines() if line.startswith("loaded ")]
 
 
 def page() -> str:

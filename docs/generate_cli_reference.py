@@ -76,7 +76,7 @@ def _walk(
 
 
 def _context(command: Any, name: str, parent: Any = None) -> Any:
-    from rbfrag.cli.parameters.option_groups import ALL_OPTIONS
+    from rbfrag.cli.command import ALL_OPTIONS
 
     context = command.context_class(
         command,
@@ -93,17 +93,17 @@ def _context(command: Any, name: str, parent: Any = None) -> Any:
 def records(command: Any) -> list[tuple[str, str]]:
     """Return name and help of each option of a command, as `--help` prints them."""
     context = _context(command, "")
-    found = (option.get_help_record(context) for option in command.get_params(context))
-    return [record for record in found if record and record[0].startswith("--")]
+    help_records = (option.get_help_record(context) for option in command.get_params(context))
+    return [record for record in help_records if record and record[0].startswith("--")]
 
 
-def shared_options(found: Collection[list[tuple[str, str]]]) -> list[tuple[str, str]]:
+def shared_options(options: Collection[list[tuple[str, str]]]) -> list[tuple[str, str]]:
     """Return the options that two commands or more have alike; of one name the most usual.
 
     Args:
-        found: the records of each command.
+        options: the records of each command.
     """
-    times = Counter(record for of_one in found for record in of_one)
+    times = Counter(record for of_one in options for record in of_one)
     usual: dict[str, tuple[str, str]] = {}
     for record, count in times.items():
         name = record[0].split()[0]

@@ -6,7 +6,12 @@ import sys
 from collections import Counter
 from pathlib import Path
 
-from rbfrag.db.data_dictionary import columns_as_markdown, data_dictionary, table_meaning
+from rbfrag.db.data_dictionary import (
+    columns_as_markdown,
+    data_dictionary,
+    table_meaning,
+    view_dictionary,
+)
 from rbfrag.db.schema import ledger
 from rbfrag.vocabulary.quantities import (
     COLUMNS,
@@ -56,20 +61,60 @@ or `samples_sha256` with `dt_s`.
 
 """
 
+FIT = """\
+import sqlite3
+
+import numpy as np
+import pandas as pd
+import statsmodels.api as sm
+
+from rbfrag.db.location import REFERENCE
+
+connection = sqlite3.connect(f"{REFERENCE.as_uri()}?mode=ro&immutable=1", uri=True)
+rows = pd.read_sql(
+    "SELECT grid, kr, p2, pgv_m_s, failed FROM outcome WHERE kind = 'toppling' AND "
+    "grid IS NOT NULL AND vertical_motion_id IS NULL AND NOT linear AND NOT on_structure",
+    connection,
+)
+strongest = rows[rows["grid"] == rows["grid"].max()]
+stable = [strongest.assign(kr=strongest["kr"] * 40 ** (n / 24), failed=0) for n in range(1, 11)]
+rows = pd.concat([rows, *stable], ignore_index=True).dropna(subset=["failed"])
+rows = rows.query("0.02 <= kr <= 1 and pgv_m_s > 0")
+p = np.sqrt(rows["p2"])
+h = np.exp(0.18 * np.log(p) - 0.06 * np.log(p) ** 2)
+x = np.column_stack([h, h * np.log(rows["pgv_m_s"] * p / (9.80665 * rows["kr"]))])
+fit = sm.GLM(rows["failed"], x, sm.families.Binomial()).fit(tol=1e-12, tol_criterion="params")
+fit.params"""
+"""The fit of outcomes by statsmodels, whose steps a notebook explains."""
+
+VIEWS = f"""\
+## Views
+
+Views join the tables for people who write SQL, in SQLite and in PostgreSQL. `rbfrag.read_table`
+returns them as well, and `db export --tables outcome` writes them. Conditions of `--where` are over
+columns of `outcome`. Response spectra join by `motion_id`. The same coefficients as by
+`rbfrag fit --method logistic --term pgv`; the notebook `sql-and-statsmodels` explains the steps:
+
+```python
+{FIT}
+```
+
+"""
+
 
 def fields() -> str:
     """Return the table of the fields that blocks, their shaking and rows of tables have."""
     rows = []
     for name in (*COLUMNS, "cohesion_pa"):
         about = QUANTITIES[name]
-        others = [
+        aliases = [
             f"**{column_of(name)}**",
-            *(each for each in INPUTS[name].aliases if each != column_of(name)),
+            *(alias for alias in INPUTS[name].aliases if alias != column_of(name)),
         ]
         doors = ["", ""]
         if name not in ROW or name == "kind":
             doors = [f"`{option_of(name)}`", f"`{parameter_of(name)}`"]
-        cells = [f"`{name}`", *doors, ", ".join(others), about.unit, about.range.words]
+        cells = [f"`{name}`", *doors, ", ".join(aliases), about.unit, about.range.words]
         rows.append(f"| {' | '.join(cells)} | {about.description('`{}`'.format)} |")
     return FIELDS + "\n".join(rows) + "\n\n"
 
@@ -95,14 +140,17 @@ def page() -> str:
     common = [column for column in times if column in usual.values()]
     parts = [fields() + keys() + HEAD + columns_as_markdown(common)]
     for table in tables:
-        own = [column for column in table.columns if column not in common]
+        specific = [column for column in table.columns if column not in common]
         also = ", ".join(f"`{column.name}`" for column in table.columns if column in common)
         parts.append(f"### {table.name}\n\n{table.meaning}\n")
-        parts += [columns_as_markdown(own)] if own else []
+        parts += [columns_as_markdown(specific)] if specific else []
         parts += [f"Also: {also}.\n"] if also else []
-    kept = table_meaning(ledger)
-    parts.append(f"### {kept.name}\n\n{kept.meaning} It is not exported.\n")
-    parts.append(columns_as_markdown(kept.columns))
+    ledger_meaning = table_meaning(ledger)
+    parts.append(f"### {ledger_meaning.name}\n\n{ledger_meaning.meaning} It is not exported.\n")
+    parts.append(columns_as_markdown(ledger_meaning.columns))
+    parts.append(VIEWS)
+    for view in view_dictionary():
+        parts += [f"### {view.name}\n\n{view.meaning}\n", columns_as_markdown(view.columns)]
     return "\n".join(parts)
 
 

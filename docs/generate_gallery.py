@@ -32,9 +32,9 @@ _LINE = re.compile(r"Drawn\s+by\*?\s+`([^`]+)`")
 def figures(page: Path) -> Iterator[tuple[str, str, str]]:
     """Yield name, description and drawing line of each figure of a page."""
     text = page.read_text(encoding="utf-8")
-    found = list(_FIGURE.finditer(text))
-    ends = [*(one.start() for one in found[1:]), len(text)]
-    for figure, after in zip(found, ends, strict=False):
+    matches = list(_FIGURE.finditer(text))
+    ends = [*(match.start() for match in matches[1:]), len(text)]
+    for figure, after in zip(matches, ends, strict=False):
         line = _LINE.search(text[figure.end() : after])
         name = Path(figure["file"] or figure["drawn"]).name
         if line is None:

@@ -34,8 +34,8 @@ def page(text: str) -> str:
     before, rest = text.split(BEGIN)
     lines = ["| rule | function | lines | what it does |", "| --- | --- | --- | --- |"]
     lines += [
-        f"| {rule} | {name} | {where} | {what} |"
-        for rule, what, name, where in sorted(rules(), key=itemgetter(0))
+        f"| {rule} | {name} | {where} | {subject} |"
+        for rule, subject, name, where in sorted(rules(), key=itemgetter(0))
     ]
     return before + BEGIN + "\n".join(lines) + "\n" + END + rest.split(END)[1]
 

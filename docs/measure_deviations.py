@@ -27,9 +27,9 @@ ROOT = Path(__file__).resolve().parent.parent
 
 def deviation(motion: GroundMotion, expected: float) -> float:
     """Return the relative deviation of the linear critical value from the closed form."""
-    found = closed.critical_angle(motion).kr_over_pga
-    assert found is not None
-    return abs(found / expected - 1.0)
+    critical = closed.critical_angle(motion).kr_over_pga
+    assert critical is not None
+    return abs(critical / expected - 1.0)
 
 
 def main() -> None:

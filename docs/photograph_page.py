@@ -31,9 +31,9 @@ def main() -> None:
     if program is None:
         sys.exit("no Chromium here: name its program")
     address = f"http://127.0.0.1:{PORT}/"
-    told = json.dumps({"port": PORT})
+    settings = json.dumps({"port": PORT})
     service = subprocess.Popen(
-        [sys.executable, "-m", "rbfrag.service"], env={**os.environ, "RBFRAG_SERVICE": told}
+        [sys.executable, "-m", "rbfrag.service"], env={**os.environ, "RBFRAG_SERVICE": settings}
     )
     try:
         for _ in range(100):

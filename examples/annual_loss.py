@@ -18,7 +18,7 @@ import pandas as pd
 
 import rbfrag
 
-HERE = Path(__file__).parent
+FOLDER = Path(__file__).parent
 
 
 class Site(NamedTuple):
@@ -36,24 +36,24 @@ def annual_loss(segments: pd.DataFrame, db: str | None) -> tuple[pd.DataFrame, l
     Every block of a site is a row of its own: an earthquake that shakes one shakes all of them.
     """
     parts, sites = [], []
-    for curve_file, some in segments.groupby("curve", sort=False):
-        (curve,) = rbfrag.read_hazard_curves(HERE / str(curve_file))
-        each = some.loc[some.index.repeat(some["blocks"])]
-        found = rbfrag.hazard(
-            curve, each["p2_1_s2"], each["kr"], component="geometric_mean", joint=True, db=db
+    for curve_file, buildings in segments.groupby("curve", sort=False):
+        (curve,) = rbfrag.read_hazard_curves(FOLDER / str(curve_file))
+        blocks = buildings.loc[buildings.index.repeat(buildings["blocks"])]
+        answer = rbfrag.hazard(
+            curve, blocks["p2_1_s2"], blocks["kr"], component="geometric_mean", joint=True, db=db
         )
-        for text in found.warnings:
+        for text in answer.warnings:
             print(f"{curve_file}: {text}", file=sys.stderr)
         rates = pd.DataFrame(
-            {"per_year": found.annual_rate, "low": found.ci_low, "high": found.ci_high},
-            index=each.index,
+            {"per_year": answer.annual_rate, "low": answer.ci_low, "high": answer.ci_high},
+            index=blocks.index,
         )
         falls = rates.groupby(level=0).sum().add_prefix("falls_")
-        parts.append(some.join(falls))
-        assert found.joint is not None
-        bounds = found.joint.bounds
+        parts.append(buildings.join(falls))
+        assert answer.joint is not None
+        bounds = answer.joint.bounds
         ends = [bounds[law]["annual_rate_any"] for law in ("fully_dependent", "independent")]
-        sites.append(Site(str(curve_file), found.annual_rate_any, ends[0], ends[1]))
+        sites.append(Site(str(curve_file), answer.annual_rate_any, ends[0], ends[1]))
     table = pd.concat(parts)
     for end in ("per_year", "low", "high"):
         table[f"loss_{end}_eur"] = table[f"falls_{end}"] * table["cost_per_block_eur"]
@@ -93,7 +93,7 @@ def print_falls(falls_per_year: float, sites: list[Site]) -> None:
 def main() -> None:
     """Print the table and the sums."""
     table, sites = annual_loss(
-        pd.read_csv(HERE / "segments.csv"), sys.argv[1] if sys.argv[1:] else None
+        pd.read_csv(FOLDER / "segments.csv"), sys.argv[1] if sys.argv[1:] else None
     )
     shown = ["segment", "blocks", "falls_per_year", "loss_per_year_eur", "loss_low_eur",
              "loss_high_eur"]  # fmt: skip

@@ -25,7 +25,7 @@ from rbfrag.solver.excitation import excitation
 from rbfrag.solver.integrator.batch import simulate_many
 from rbfrag.solver.integrator.toppling_kernel import TOPPLED
 
-HERE = Path(__file__).parent
+FOLDER = Path(__file__).parent
 FILES = {
     "HVSC Feb 2011": "*CCHURCH_HVSC*.AT2",
     "LPCC Feb 2011": "*CCHURCH_LPCC*.AT2",
@@ -42,22 +42,22 @@ def shares(motion: rbfrag.GroundMotion, p2: np.ndarray, kr: np.ndarray) -> dict[
         simulate_many(excitation(motion, polarity=way), p2=p2, kr=kr).outcome == TOPPLED
         for way in ("forward", "reverse")
     ]
-    known = {"pgv_m_s": motion.pgv_m_s}
-    more = {**known, "pga_g": motion.pga_g, "tm_s": motion.tm_s}
+    pgv_only = {"pgv_m_s": motion.pgv_m_s}
+    more = {**pgv_only, "pga_g": motion.pga_g, "tm_s": motion.tm_s}
     by_record = [rbfrag.predict(a, b, motion=motion).probability
                  for a, b in zip(p2.tolist(), kr.tolist(), strict=True)]  # fmt: skip
-    found = {"simulated": float(np.mean(toppled)), "from the record": float(np.mean(by_record))}
-    for name, given in (("from PGV, PGA, Tm", more), ("from PGV", known)):
-        answer = rbfrag.predict(p2, kr, **given)
-        found[name] = float(np.mean(answer.probability))
-        found[f"{name}, low"] = float(np.mean(answer.ci_low))
-        found[f"{name}, high"] = float(np.mean(answer.ci_high))
-    return found
+    fractions = {"simulated": float(np.mean(toppled)), "from the record": float(np.mean(by_record))}
+    for name, measures in (("from PGV, PGA, Tm", more), ("from PGV", pgv_only)):
+        answer = rbfrag.predict(p2, kr, **measures)
+        fractions[name] = float(np.mean(answer.probability))
+        fractions[f"{name}, low"] = float(np.mean(answer.ci_low))
+        fractions[f"{name}, high"] = float(np.mean(answer.ci_high))
+    return fractions
 
 
 def study(records: Path) -> pd.DataFrame:
     """Return one row a record."""
-    p2, kr, share = toppling_blocks(read_rock_mass(HERE / "canterbury-face.toml").realise())
+    p2, kr, share = toppling_blocks(read_rock_mass(FOLDER / "canterbury-face.toml").realise())
     print(f"{p2.size} stable toppling blocks, {100 * share:.3g} % of the face; "
           f"p² {np.quantile(p2, 0.05):.3g} to {np.quantile(p2, 0.95):.3g} 1/s², "
           f"k_r {np.quantile(kr, 0.05):.2g} to {np.quantile(kr, 0.95):.2g}")  # fmt: skip
@@ -108,12 +108,12 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("records", type=Path)
     parser.add_argument("--out", help="figure to write (.png, .svg)")
-    given = parser.parse_args()
-    table = study(given.records)
+    options = parser.parse_args()
+    table = study(options.records)
     shown = ["station", "component", "pga_g", "pgv_m_s", "tm_s", *ANSWERS]
     print(table[shown].to_string(index=False, float_format=lambda value: f"{value:.3f}"))
-    if given.out:
-        draw(table, given.out)
+    if options.out:
+        draw(table, options.out)
 
 
 if __name__ == "__main__":

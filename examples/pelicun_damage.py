@@ -39,8 +39,10 @@ def damage_shares(table: str, level: float, seed: int = 7) -> list[float]:
     reached = run.damage.save_sample()
     states = sorted(set(reached.columns.get_level_values("ds")) - {"0"})
     # a damage state is the last limit state that is reached
-    each = [float(reached.xs(state, level="ds", axis=1).mean().iloc[0]) for state in states]
-    return [sum(each[i:]) for i in range(len(each))]
+    state_fractions = [
+        float(reached.xs(state, level="ds", axis=1).mean().iloc[0]) for state in states
+    ]
+    return [sum(state_fractions[i:]) for i in range(len(state_fractions))]
 
 
 if __name__ == "__main__":

@@ -2,6 +2,7 @@
 from rbfrag.campaign.add_motions import add_motions as add_motions
 from rbfrag.campaign.rock_mass_answer import RockMassAnswer as RockMassAnswer
 from rbfrag.campaign.rock_mass_answer import rockmass as rockmass
+from rbfrag.campaign.rotate_motions import rotate_motions as rotate_motions
 from rbfrag.campaign.simulate import simulate as simulate
 from rbfrag.errors import DatabaseError as DatabaseError
 from rbfrag.errors import FitError as FitError
@@ -16,7 +17,7 @@ from rbfrag.exchange.event_losses import losses as losses
 from rbfrag.exchange.map_answer import ShakeMapAnswer as ShakeMapAnswer
 from rbfrag.exchange.map_answer import shakemap as shakemap
 from rbfrag.exchange.mesh_file import block_from_mesh as block_from_mesh
-from rbfrag.exchange.release import write_release_rates as write_release_rates
+from rbfrag.exchange.rate_tables import write_release_rates as write_release_rates
 from rbfrag.fragility.fit.stored import fit as fit
 from rbfrag.hazards.curve import HazardCurve as HazardCurve
 from rbfrag.hazards.curve_file import read_hazard_curves as read_hazard_curves
@@ -33,8 +34,10 @@ from rbfrag.motions.ground_motion import GroundMotion as GroundMotion
 from rbfrag.motions.readers import read_motions as read_motions
 from rbfrag.motions.toppling_spectrum import toppling_spectrum as toppling_spectrum
 from rbfrag.plots import plot as plot
-from rbfrag.plots.report.write import report as report
+from rbfrag.plots.report import report as report
 from rbfrag.question.question import predict as predict
+from rbfrag.question.respond_draws import DrawnResponses as DrawnResponses
+from rbfrag.question.respond_draws import respond_draws as respond_draws
 from rbfrag.solver.block.arrays import BlockArray as BlockArray
 from rbfrag.solver.block.geometry import Block as Block
 from rbfrag.solver.block.mesh_block import MeshBlock as MeshBlock
@@ -42,8 +45,6 @@ from rbfrag.solver.critical import critical as critical
 from rbfrag.solver.critical_result import CriticalResult as CriticalResult
 from rbfrag.solver.models.sliding import sliding_displacements as sliding_displacements
 from rbfrag.solver.respond import respond as respond
-from rbfrag.solver.respond_draws import DrawnResponses as DrawnResponses
-from rbfrag.solver.respond_draws import respond_draws as respond_draws
 from rbfrag.solver.results import Outcome as Outcome
 from rbfrag.solver.results import Response as Response
 from rbfrag.solver.stability.arrays import StabilityArray as StabilityArray

@@ -180,7 +180,7 @@ def toml_document(text: str, source: str | os.PathLike[str] | None = None) -> di
         _reject_large([document])
     except RecursionError:
         raise InputError(f"{named}unsupported TOML: tables nested too deeply") from None
-    # beside its own error, the parser passes on that of an integer of thousands of digits
+    # in addition to its own error, the parser raises that of an integer of thousands of digits
     except ValueError as error:
         raise InputError(f"{named}not valid TOML: {error}") from None
     return document
@@ -232,6 +232,15 @@ def is_number(value: object) -> bool:
     try:
         float(value)
     except OverflowError:
+        return False
+    return True
+
+
+def is_numeral(text: str) -> bool:
+    """Return whether a text is a number."""
+    try:
+        float(text)
+    except ValueError:
         return False
     return True
 

@@ -58,5 +58,5 @@ def write_suite(folder: Path, count: int = 6) -> Path:
 
 def unknown_measures(n: int) -> dict[str, np.ndarray]:
     """Return unknown measures of n motions: spectrum, energy and magnitude."""
-    others = (name for name in MEASURES if name not in ("pga_g", "pgv_m_s", "pgd_m", "tm_s"))
-    return {name: np.full(n, np.nan) for name in others}
+    rest = (name for name in MEASURES if name not in ("pga_g", "pgv_m_s", "pgd_m", "tm_s"))
+    return {name: np.full(n, np.nan) for name in rest}

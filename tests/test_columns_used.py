@@ -18,9 +18,7 @@ from rbfrag.exchange.block_rows import read_blocks
 from rbfrag.exchange.table_answers import predict_table
 from rbfrag.fragility import describe
 from rbfrag.question.table import field_of
-from rbfrag.vocabulary.quantities import (
-    column_of,
-)
+from rbfrag.vocabulary.quantities import column_of
 from tests.cli.conftest import Shell
 from tests.cli.conftest import shell as shell
 from tests.plots.test_report import words_of
@@ -89,8 +87,8 @@ def test_columns_about_back_cohesion_and_water_are_used(
     header: str, cell: Any, inputs: dict[str, Any]
 ) -> None:
     question = {name: values[0] for name, values in TABLE.items()} | {"beta_deg": 4.0}
-    found = table_answer({**TABLE, "dip": [4.0], header: [cell]})
-    agree(found, from_python({**question, **inputs}), header)
+    result = table_answer({**TABLE, "dip": [4.0], header: [cell]})
+    agree(result, from_python({**question, **inputs}), header)
 
 
 def test_what_is_pasted_on_the_page_is_used(open_page: Any) -> None:
@@ -102,9 +100,9 @@ def test_what_is_pasted_on_the_page_is_used(open_page: Any) -> None:
     page.fill("#table-text", text)
     with page.expect_response(lambda r: "v1/table" in r.url, timeout=90_000) as waited:
         page.click("#table-ask")
-    found = [float(row["probability"]) for row in rows_of(waited.value.json()["table"])]
+    values = [float(row["probability"]) for row in rows_of(waited.value.json()["table"])]
     slab = {"height_m": 2.1, "width_m": 0.35, "phi_deg": 38.0, "pgv_m_s": 0.5}
-    assert found == pytest.approx(
+    assert values == pytest.approx(
         [
             p_of(**slab, beta_deg=5.0),
             p_of(**slab, beta_deg=0.0, kind="rocking"),
@@ -116,19 +114,19 @@ def test_what_is_pasted_on_the_page_is_used(open_page: Any) -> None:
 
 
 def test_centimetres_are_questioned_before_the_answer(shell: Shell) -> None:
-    asked = ("--height", "210", "--width", "35", "--pgv", "0.5")
-    lines = shell("predict", *asked).stdout.splitlines()
+    command = ("--height", "210", "--width", "35", "--pgv", "0.5")
+    lines = shell("predict", *command).stdout.splitlines()
     assert lines[0] == "Check the unit: height 210 m (in cm?)"
     text = "Check the unit: height 210 m (in cm?)"
-    assert text in shell.json("predict", *asked)["warnings"]
+    assert text in shell.json("predict", *command)["warnings"]
     assert text in rbfrag.predict(height_m=210.0, width_m=35.0, pgv_m_s=0.5).warnings
     many = rbfrag.predict(height_m=np.array([2.0, 210.0]), width_m=0.5, pgv_m_s=0.5)
     assert text in many.warnings
     Path("a.csv").write_text("height_m,width_m,pgv_m_s\n2,0.4,0.5\n210,35,0.5\n")
-    found = predict_table("a.csv", inputs={})
-    assert text in found.warnings
-    assert [row["warnings"].split().count("check_unit") for row in found.blocks] == [0, 1]
-    shell("report", *asked, "--out", "a.html")
+    prediction = predict_table("a.csv", inputs={})
+    assert text in prediction.warnings
+    assert [row["warnings"].split().count("check_unit") for row in prediction.blocks] == [0, 1]
+    shell("report", *command, "--out", "a.html")
     assert text in words_of(Path("a.html"))
     assert "p² = 0.05 s⁻² is a block of 300 m" in str(
         rbfrag.predict(0.05, 0.1, pgv_m_s=0.5).warnings
@@ -136,24 +134,24 @@ def test_centimetres_are_questioned_before_the_answer(shell: Shell) -> None:
 
 
 def test_radians_are_questioned() -> None:
-    told = rbfrag.predict(height_m=2.0, width_m=0.4, beta_deg=0.0873, pgv_m_s=0.6).warnings
-    assert any("is it in radians?" in text for text in told)
+    document = rbfrag.predict(height_m=2.0, width_m=0.4, beta_deg=0.0873, pgv_m_s=0.6).warnings
+    assert any("is it in radians?" in text for text in document)
     for usual in (0.0, 0.5, 1.0, 5.0):
-        told = rbfrag.predict(height_m=2.0, width_m=0.4, beta_deg=usual, pgv_m_s=0.6).warnings
-        assert not any("radians" in text for text in told)
+        document = rbfrag.predict(height_m=2.0, width_m=0.4, beta_deg=usual, pgv_m_s=0.6).warnings
+        assert not any("radians" in text for text in document)
 
 
 def test_survival_does_not_guess_the_kind(shell: Shell) -> None:
     Path("curve.csv").write_text(CURVE)
-    asked = ("survival", "curve.csv", "--height", "1.2", "--width", "0.4", "--age", "10000")
-    result = shell(*asked, expect=2)
+    command = ("survival", "curve.csv", "--height", "1.2", "--width", "0.4", "--age", "10000")
+    result = shell(*command, expect=2)
     assert result.stderr.startswith("rbfrag: --kind is missing: give rocking (free-standing")
-    found = shell.json(*asked, "--kind", "rocking")["probability_standing"]
-    backed = shell.json(*asked, "--kind", "toppling")["probability_standing"]
-    assert found < 0.5 * backed
+    answer = shell.json(*command, "--kind", "rocking")["probability_standing"]
+    backed = shell.json(*command, "--kind", "toppling")["probability_standing"]
+    assert answer < 0.5 * backed
     Path("two.csv").write_text("height,width,Stands free?\n1.2,0.4,yes\n")
-    told = shell.json("survival", "curve.csv", "--blocks", "two.csv", "--age", "10000")
-    assert told["probability_standing"] == pytest.approx(found, rel=1e-9)
+    document = shell.json("survival", "curve.csv", "--blocks", "two.csv", "--age", "10000")
+    assert document["probability_standing"] == pytest.approx(answer, rel=1e-9)
     with pytest.raises(InputError, match="kind is missing"):
         rbfrag.survival("curve.csv", height_m=1.2, width_m=0.4, age_years=1e4)
 
@@ -174,7 +172,7 @@ def test_count_multiplies(shell: Shell) -> None:
         results[name] = [
             predicted.expected_failures, rates["expected_failures_per_year"],
             rates["expected_failures_low"], rates["annual_rate_any"],
-            *(each["annual_rate"] for each in rates["annual_rate_at_least"]),
+            *(item["annual_rate"] for item in rates["annual_rate_at_least"]),
             stands["probability_standing"],
         ]  # fmt: skip
         ends = predicted.failures_low, predicted.failures_high
@@ -189,8 +187,8 @@ def test_blocks_elsewhere_are_not_answered_for_the_map(shell: Shell, formats_dir
     Path("swiss.csv").write_text(
         "height_m,width_m,x,y,crs\n2,0.4,2600000,1200000,EPSG:2056\n3,0.5,2600100,1200000,EPSG:2056\n"
     )
-    asked = ("shakemap", str(grid), "--blocks", "swiss.csv", "--out", "a.csv")
-    assert "off the map" in shell(*asked, expect=2).stderr
+    command = ("shakemap", str(grid), "--blocks", "swiss.csv", "--out", "a.csv")
+    assert "off the map" in shell(*command, expect=2).stderr
     answer = rbfrag.shakemap(grid, 3.0, 0.1)
     best = int(np.nanargmax(answer.columns["probability"]))
     lon, lat = (float(answer.columns[name][best]) for name in ("lon", "lat"))
@@ -209,10 +207,10 @@ def test_blocks_elsewhere_are_not_answered_for_the_map(shell: Shell, formats_dir
 
 def test_a_report_integrates_the_dispersion_of_a_column(shell: Shell) -> None:
     Path("a.csv").write_text("height_m,width_m,dip,phi,pgv_m_s,pgv_sigma\n2,0.4,0,38,0.3,0.65\n")
-    found = shell.json("report", "a.csv", "--out", "a.pdf")["blocks"][0]["probability"]
+    answer = shell.json("report", "a.csv", "--out", "a.pdf")["blocks"][0]["probability"]
     expected = p_of(height_m=2.0, width_m=0.4, beta_deg=0.0, phi_deg=38.0, pgv_m_s=0.3,
                     pgv_sigma=0.65)  # fmt: skip
-    assert found == pytest.approx(expected, rel=1e-12)
+    assert answer == pytest.approx(expected, rel=1e-12)
     assert expected > 1e-3
 
 
@@ -223,10 +221,12 @@ def test_a_block_that_is_unstable_at_rest_is_first_in_a_report(shell: Shell, suf
         "block_id,height_m,width_m,dip,phi\nexample,9,9,0,38\nA,2,0.4,3,38\nB,3,0.45,12,36\n"
     )
     out = f"a.{suffix}"
-    told = shell.json("report", "a.csv", "--pgv", "0.6", "--hazard", "curve.csv", "--out", out)
-    assert (told["blocks"][0]["block_id"], told["blocks"][0]["probability"]) == ("B", 1.0)
-    assert told["blocks_unstable"] == 1
-    assert told["expected_failures"] == pytest.approx(1.0 + told["blocks"][1]["probability"])
+    document = shell.json("report", "a.csv", "--pgv", "0.6", "--hazard", "curve.csv", "--out", out)
+    assert (document["blocks"][0]["block_id"], document["blocks"][0]["probability"]) == ("B", 1.0)
+    assert document["blocks_unstable"] == 1
+    assert document["expected_failures"] == pytest.approx(
+        1.0 + document["blocks"][1]["probability"]
+    )
     text = words_of(Path(out), pages=2)
     assert text.index(" B ") < text.index(" A ")
     for phrase in (
@@ -242,9 +242,9 @@ def test_a_single_block_that_is_unstable_at_rest_has_p_1(shell: Shell, client: T
     assert (answer.probability, answer.ci_low, answer.how) == (1.0, 1.0, "by mechanics")
     codes = [getattr(text, "code", "") for text in answer.warnings]
     assert "unstable_at_rest" in codes
-    asked = ("--height", "3", "--width", "0.45", "--dip", "12", "--phi", "36", "--pgv", "0.5")
-    assert shell.json("predict", *asked)["probability"] == 1.0
-    printed = shell("predict", *asked)
+    command = ("--height", "3", "--width", "0.45", "--dip", "12", "--phi", "36", "--pgv", "0.5")
+    assert shell.json("predict", *command)["probability"] == 1.0
+    printed = shell("predict", *command)
     assert printed.stdout.startswith("P(toppling) = 1   the block is unstable without shaking")
     words = {"height": 3, "width": 0.45, "dip": 12, "phi": 36, "pgv": 0.5}
     assert client.get("/v1/predict", params=words).json()["probability"] == 1.0
@@ -335,10 +335,10 @@ def check_header(row: dict[str, str]) -> None:
         assert match.field == field
         return
     columns = {column_of(name): [v] for name, v in question.items() if name != field}
-    found = table_answer({**columns, header: [cell]})
-    if isinstance(found, str) and f"'{header}'" in found:
+    result = table_answer({**columns, header: [cell]})
+    if isinstance(result, str) and f"'{header}'" in result:
         return  # rejected, naming it
-    agree(found, from_python(question), f"{header}: {found}")
+    agree(result, from_python(question), f"{header}: {result}")
 
 
 def check_not_an_input(header: str) -> None:
@@ -363,9 +363,9 @@ def test_every_output_has_the_notes(shell: Shell) -> None:
         "column Höhe [cm]: converted from cm to m", "column ignored: Colour",
         "water not given in 1 of 2 rows: assumed dry",
     )  # fmt: skip
-    told = shell.json("predict", "--blocks", "in.csv", "--pgv", "0.6")
+    answer = shell.json("predict", "--blocks", "in.csv", "--pgv", "0.6")
     for text in texts:
-        assert text in told["warnings"]
+        assert text in answer["warnings"]
     for suffix in ("csv", "xlsx", "parquet"):
         shell("predict", "--blocks", "in.csv", "--pgv", "0.6", "--out", f"out.{suffix}")
     beside = json.loads(Path("out.csv-metadata.json").read_text("utf-8"))
@@ -395,8 +395,8 @@ def test_a_kind_column_is_understood_or_named() -> None:
     slab = {name: [v, v] for name, v in USUAL.items()}
     columns = {**slab, "Block type": ["slab", "column"]}
     pd.DataFrame(columns).to_csv("a.csv", index=False)
-    told = predict_table("a.csv", inputs={}).warnings
-    assert any("Block type (slab, column): no word names a kind" in text for text in told)
+    document = predict_table("a.csv", inputs={}).warnings
+    assert any("Block type (slab, column): no word names a kind" in text for text in document)
     for words in (["slab", "free-standing"], ["", "rokcing"]):
         pd.DataFrame({**slab, "Type": words}).to_csv("a.csv", index=False)
         with pytest.raises(InputError, match="is not a kind of failure"):
@@ -418,8 +418,8 @@ def test_ignore_columns_overrules(shell: Shell) -> None:
     Path("a.csv").write_text("height_m,width_m,phi,dip quality,pgv_m_s\n2,0.4,38,good,0.6\n")
     rejected = shell("predict", "--blocks", "a.csv", expect=2).stderr
     assert "'dip quality' is unknown; for the dip of the base" in rejected
-    told = shell.json("predict", "--blocks", "a.csv", "--ignore-columns", "dip quality")
-    assert "column ignored: dip quality" in told["warnings"]
+    document = shell.json("predict", "--blocks", "a.csv", "--ignore-columns", "dip quality")
+    assert "column ignored: dip quality" in document["warnings"]
     assert "unknown column 'depth'" in shell(
         "predict", "--blocks", "a.csv", "--ignore-columns", "depth", expect=2
     ).stderr  # fmt: skip
@@ -431,32 +431,32 @@ def test_ignore_columns_overrules(shell: Shell) -> None:
 def test_field_notes_become_one_document(shell: Shell, cases_dir: Path) -> None:
     book, meaning = cases_dir / "fieldnotes.xlsx", cases_dir / "fieldnotes_meaning.csv"
     for suffix in ("pdf", "html"):
-        told = shell.json("report", str(book), "--pgv", "0.5", "--out", f"notes.{suffix}")
-    found = {block["block_id"]: block["probability"] for block in told["blocks"]}
-    assert next(iter(found)) == "R5"
+        answer = shell.json("report", str(book), "--pgv", "0.5", "--out", f"notes.{suffix}")
+    result = {block["block_id"]: block["probability"] for block in answer["blocks"]}
+    assert next(iter(result)) == "R5"
     with meaning.open(encoding="utf-8") as file:
         rows = [[*row.values()] for row in csv.DictReader(file)]
     for name, text, *_ in rows:
         if text.startswith("rejected"):
-            (reason,) = (r["reason"] for r in told["rejected"] if r["block_id"] == name)
+            (reason,) = (r["reason"] for r in answer["rejected"] if r["block_id"] == name)
             assert "dip" in reason
         elif "unstable at rest" in "".join(rows[[r[0] for r in rows].index(name)]):
-            assert found[name] == 1.0
+            assert result[name] == 1.0
         else:
-            asked = rbfrag.predict(**keywords(text), pgv_m_s=0.5)
-            assert found[name] == pytest.approx(asked.probability, rel=1e-12)
-            assert (asked.drained is None) == (name not in ("R8", "R9"))
-            (block,) = (block for block in told["blocks"] if block["block_id"] == name)
-            assert block["drained"] == (asked.drained and pytest.approx(asked.drained, rel=1e-12))
+            inputs = rbfrag.predict(**keywords(text), pgv_m_s=0.5)
+            assert result[name] == pytest.approx(inputs.probability, rel=1e-12)
+            assert (inputs.drained is None) == (name not in ("R8", "R9"))
+            (block,) = (block for block in answer["blocks"] if block["block_id"] == name)
+            assert block["drained"] == (inputs.drained and pytest.approx(inputs.drained, rel=1e-12))
             if name == "R12":
                 assert any("cohesion has no effect on k_r" in w for w in block["warnings"])
     for suffix in ("pdf", "html"):
         document = words_of(Path(f"notes.{suffix}"), pages=7).replace("kᵣ", "k_r")
-        for block in told["blocks"]:
+        for block in answer["blocks"]:
             assert not block["drained"] or describe.drained_bound(block["drained"]) in document
-        for text in (*told["warnings"], *(reason["reason"] for reason in told["rejected"])):
+        for text in (*answer["warnings"], *(reason["reason"] for reason in answer["rejected"])):
             assert text[1:40] in document, text
-        for block in told["blocks"]:
+        for block in answer["blocks"]:
             for text in block["warnings"]:
                 assert text[1:40] in document, text
 

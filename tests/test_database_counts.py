@@ -8,7 +8,7 @@ from tests.conftest import pytest_terminal_summary
 
 
 def _line(*properties: list[tuple[str, str]]) -> list[str]:
-    reports = [SimpleNamespace(when="call", user_properties=each) for each in properties]
+    reports = [SimpleNamespace(when="call", user_properties=item) for item in properties]
     reports.append(SimpleNamespace(when="setup", user_properties=[("database", "sqlite")]))
     lines: list[str] = []
     reporter = SimpleNamespace(

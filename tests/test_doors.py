@@ -28,14 +28,7 @@ from rbfrag.service.app import make_app
 from rbfrag.service.settings import ServiceSettings
 from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.stability.single import stability
-from rbfrag.vocabulary.quantities import (
-    BLOCK,
-    INPUTS,
-    SHAKING,
-    column_of,
-    option_of,
-    parameter_of,
-)
+from rbfrag.vocabulary.quantities import BLOCK, INPUTS, SHAKING, column_of, option_of, parameter_of
 from tests.cli.conftest import Shell
 from tests.cli.conftest import shell as shell
 from tests.exchange.openquake_job import write_job
@@ -153,10 +146,10 @@ BY_NUMBERS: list[dict[str, Any]] = [
     {"ky": 0.1, "displacement_m": 0.1, "pgv_m_s": 0.7, "pga_g": 0.5, "magnitude": 7.0},
     {"ky": 0.1, "displacement_m": 0.1, "pgv_m_s": 0.7, "pga_g": 0.5, "arias_m_s": 3.0},
 ]
-QUESTIONS = [{"pgv_m_s": 0.6, **each} for each in (*SHAPES, *BY_NUMBERS)]
+QUESTIONS = [{"pgv_m_s": 0.6, **item} for item in (*SHAPES, *BY_NUMBERS)]
 
 
-class Told(NamedTuple):
+class Reply(NamedTuple):
     """An answer, or why there is none."""
 
     numbers: tuple[float, ...]
@@ -175,74 +168,74 @@ def _reference(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.delenv("RBFRAG_DB", raising=False)
 
 
-def from_python(question: dict[str, Any]) -> Told:
+def from_python(question: dict[str, Any]) -> Reply:
     try:
         answer = rbfrag.predict(**question)
     except RbfragError as error:
-        return Told((), "", "", str(error))
+        return Reply((), "", "", str(error))
     assert isinstance(answer, Prediction)
-    return Told(
+    return Reply(
         tuple(getattr(answer, name) or math.nan for name in NUMBERS), answer.kind, answer.mode, ""
     )
 
 
-def agree(told: Told, expected: Told, question: dict[str, Any]) -> None:
+def agree(output: Reply, expected: Reply, question: dict[str, Any]) -> None:
     """Compare a door that answers one by one, or by rows, with Python's answer to one."""
     if not expected.numbers:
-        assert told.reason, words(question)
-        assert not told.numbers or math.isnan(told.numbers[0]), (words(question), told)
+        assert output.reason, words(question)
+        assert not output.numbers or math.isnan(output.numbers[0]), (words(question), output)
         return
-    assert told.numbers, (words(question), told.reason)
-    known = [(a, b) for a, b in zip(told.numbers, expected.numbers, strict=True) if b == b]
-    for found, wanted in known:
-        assert found == pytest.approx(wanted, rel=1e-9 if "sigma" in words(question) else 1e-12), (
-            words(question), told, expected,
+    assert output.numbers, (words(question), output.reason)
+    reference = [(a, b) for a, b in zip(output.numbers, expected.numbers, strict=True) if b == b]
+    for result, target in reference:
+        assert result == pytest.approx(target, rel=1e-9 if "sigma" in words(question) else 1e-12), (
+            words(question), output, expected,
         )  # fmt: skip
-    assert (told.kind, told.mode) == (expected.kind, expected.mode), words(question)
+    assert (output.kind, output.mode) == (expected.kind, expected.mode), words(question)
 
 
 PHYSICAL = {*BLOCK, *SHAKING}
-REFERENCE_ANSWERS: dict[int, Told] = {}
+REFERENCE_ANSWERS: dict[int, Reply] = {}
 
 
-def expected_of(i: int) -> Told:
+def expected_of(i: int) -> Reply:
     if i not in REFERENCE_ANSWERS:
         REFERENCE_ANSWERS[i] = from_python(QUESTIONS[i])
     return REFERENCE_ANSWERS[i]
 
 
-def same_reason(told: str, expected: str, spell: Callable[[str], str]) -> bool:
+def same_reason(output: str, expected: str, spell: Callable[[str], str]) -> bool:
     """Return whether a rejection says what Python's says, its fields as a door spells them."""
     shown = expected
     for name in sorted(PHYSICAL, key=len, reverse=True):
-        for each in (spell(name), name):
-            told, shown = told.replace(each, "~"), shown.replace(each, "~")
-    return shown.split("(")[0][:25] in told or told.split("(")[0][:25] in shown
+        for word in (spell(name), name):
+            output, shown = output.replace(word, "~"), shown.replace(word, "~")
+    return shown.split("(")[0][:25] in output or output.split("(")[0][:25] in shown
 
 
 def test_there_are_sixty_questions_of_every_sort() -> None:
     assert len(QUESTIONS) >= 60
     answers = [expected_of(i) for i in range(len(QUESTIONS))]
-    assert {told.kind for told in answers if told.numbers} == {
+    assert {output.kind for output in answers if output.numbers} == {
         "toppling", "rocking", "sliding", "slumping", "confined_toppling",
     }  # fmt: skip
-    assert sum(not told.numbers for told in answers) > 10
+    assert sum(not output.numbers for output in answers) > 10
 
 
 def test_the_shell_answers_likewise(shell: Shell) -> None:
     for i, question in enumerate(QUESTIONS):
         expected = expected_of(i)
-        stated = {name: value for name, value in question.items() if name != "kind"}
-        options = [f"{option_of(name)}={value!r}" for name, value in stated.items()]
+        nominal = {name: value for name, value in question.items() if name != "kind"}
+        options = [f"{option_of(name)}={value!r}" for name, value in nominal.items()]
         kind = ["--kind", question["kind"]] if "kind" in question else []
         status = 0 if expected.numbers else 2
         result = shell("predict", *options, *kind, "--json", expect=status)
         if not expected.numbers:
             assert result.stderr.strip() == f"rbfrag: {spelled_rejection(question, option_of)}"
             continue
-        told = json.loads(result.stdout)
-        numbers = tuple(math.nan if told[name] is None else told[name] for name in NUMBERS)
-        agree(Told(numbers, told["kind"], told["mode"], ""), expected, question)
+        output = json.loads(result.stdout)
+        numbers = tuple(math.nan if output[name] is None else output[name] for name in NUMBERS)
+        agree(Reply(numbers, output["kind"], output["mode"], ""), expected, question)
 
 
 def test_arrays_answer_likewise() -> None:
@@ -254,15 +247,15 @@ def test_arrays_answer_likewise() -> None:
         try:
             answer = rbfrag.predict(**arrays)
         except RbfragError as error:
-            agree(Told((), "", "", str(error)), expected_of(i), question)
+            agree(Reply((), "", "", str(error)), expected_of(i), question)
             continue
         assert isinstance(answer, PredictionArray)
         for place in range(2):
-            told = Told(
+            document = Reply(
                 tuple(float(getattr(answer, name)[place]) for name in NUMBERS),
                 answer.kinds[place], answer.modes[place], answer.reason[place],
             )  # fmt: skip
-            agree(told, expected_of(i), question)
+            agree(document, expected_of(i), question)
 
 
 @pytest.mark.parametrize("size", [None, 2])
@@ -282,7 +275,9 @@ UNSTABLE_AT_REST = (1.0, 1.0, 1.0)
 def table(folder: Path, form: str) -> tuple[Path, list[int]]:
     """Write the questions about certain blocks, by one measure, as the rows of one table."""
     rows = [
-        i for i, each in enumerate(QUESTIONS) if "_sigma" not in words(each) and "pga_g" not in each
+        i
+        for i, question in enumerate(QUESTIONS)
+        if "_sigma" not in words(question) and "pga_g" not in question
     ]
     # an empty dip is a missing value, not a level base
     level = [{"beta_deg": 0.0} if "height_m" in QUESTIONS[i] else {} for i in rows]
@@ -329,18 +324,18 @@ def test_a_mixed_table_answers_each_row_likewise(tmp_path: Path, form: str) -> N
         return math.nan if text(cell) == "" else float(cell)
 
     for i, row in zip(rows, answers, strict=True):
-        told = Told(
+        document = Reply(
             tuple(number(row[name]) for name in NUMBERS), text(row["kind"]), text(row["mode"]),
             text(row["reason"]),
         )  # fmt: skip
-        agree(told, expected_of(i), QUESTIONS[i])
+        agree(document, expected_of(i), QUESTIONS[i])
 
 
 @pytest.fixture(scope="module")
 def client() -> Iterator[TestClient]:
     app = make_app(ServiceSettings(db=str(REFERENCE)))
-    with TestClient(app, raise_server_exceptions=False) as found:
-        yield found
+    with TestClient(app, raise_server_exceptions=False) as result:
+        yield result
 
 
 @pytest.mark.parametrize("sites", [1, 5, 30])
@@ -348,14 +343,14 @@ def test_the_range_of_some_sites_is_the_same_at_every_door(
     shell: Shell, client: TestClient, sites: int
 ) -> None:
     question = {"p2": 3.0, "kr": 0.1, "pgv_m_s": 0.8, "pga_g": 0.5}
-    one = rbfrag.predict(**question, sites=sites)
-    assert isinstance(one, Prediction)
-    ends = (one.event_low, one.event_high)
+    single = rbfrag.predict(**question, sites=sites)
+    assert isinstance(single, Prediction)
+    ends = (single.event_low, single.event_high)
     words = {"p2": 3.0, "kr": 0.1, "pgv": 0.8, "pga": 0.5, "sites": sites}
     options = [text for name, value in words.items() for text in (f"--{name}", str(value))]
-    told = shell.json("predict", *options)
-    asked = client.get("/v1/predict", params=words).json()
-    for document in (told, asked):
+    answer = shell.json("predict", *options)
+    inputs = client.get("/v1/predict", params=words).json()
+    for document in (answer, inputs):
         assert document["sites"] == sites
         assert (document["event_low"], document["event_high"]) == ends
     body = {**words, "kr": [0.1, 0.2], "sites": float(sites)}
@@ -390,13 +385,13 @@ def test_requests_for_one_block_answer_likewise(client: TestClient) -> None:
     for i, question in enumerate(QUESTIONS):
         expected = expected_of(i)
         response = client.get("/v1/predict", params=parameters(question))
-        told = response.json()
+        document = response.json()
         if response.status_code != 200:
-            assert response.status_code == 422, (words(question), told)
-            assert told["detail"] == rejection_of(question), words(question)
+            assert response.status_code == 422, (words(question), document)
+            assert document["detail"] == rejection_of(question), words(question)
             continue
-        numbers = tuple(math.nan if told[name] is None else told[name] for name in NUMBERS)
-        agree(Told(numbers, told["kind"], told["mode"], ""), expected, question)
+        numbers = tuple(math.nan if document[name] is None else document[name] for name in NUMBERS)
+        agree(Reply(numbers, document["kind"], document["mode"], ""), expected, question)
 
 
 def test_requests_for_many_blocks_answer_likewise(client: TestClient) -> None:
@@ -407,20 +402,21 @@ def test_requests_for_many_blocks_answer_likewise(client: TestClient) -> None:
         }
         arrays = {n: v if isinstance(v, str) else np.full(2, v) for n, v in question.items()}
         response = client.post("/v1/predict", json=lists)
-        told = response.json()
+        document = response.json()
         if response.status_code != 200:
-            assert response.status_code == 422, (words(question), told)
-            assert told["detail"] == rejection_of(arrays), words(question)
+            assert response.status_code == 422, (words(question), document)
+            assert document["detail"] == rejection_of(arrays), words(question)
             continue
-        whole = rbfrag.predict(**arrays)
-        assert isinstance(whole, PredictionArray)
-        assert told["reason"] == whole.reason.tolist(), words(question)
+        complete = rbfrag.predict(**arrays)
+        assert isinstance(complete, PredictionArray)
+        assert document["reason"] == complete.reason.tolist(), words(question)
         for place in range(2):
             numbers = tuple(
-                math.nan if told[name][place] is None else told[name][place] for name in NUMBERS
+                math.nan if document[name][place] is None else document[name][place]
+                for name in NUMBERS
             )
-            texts = (told[name][place] for name in ("kinds", "modes", "reason"))
-            answer = Told(numbers, *texts)
+            texts = (document[name][place] for name in ("kinds", "modes", "reason"))
+            answer = Reply(numbers, *texts)
             agree(answer, expected_of(i), question)
 
 
@@ -444,7 +440,11 @@ def test_what_is_typed_into_the_page_is_answered_likewise(
     opened = open_page("")
     page = opened.page
     for typed in TYPED:
-        question = next(each for each in QUESTIONS if each == {"pgv_m_s": 0.6, **typed})
+        question = next(
+            question_inputs
+            for question_inputs in QUESTIONS
+            if question_inputs == {"pgv_m_s": 0.6, **typed}
+        )
         shape = next(shape for name, shape in FIELDS_OF_SHAPES.items() if name in question)
         page.locator(f"input[name=shape][value={shape}]").check()
         page.locator(f"input[name=kind][value='{question.get('kind', '')}']").check()
@@ -457,8 +457,8 @@ def test_what_is_typed_into_the_page_is_answered_likewise(
         if not expected.numbers:
             expect(page.locator("#probability")).to_have_attribute("data-state", "none")
             if "at rest" not in expected.reason:  # which the page says of its drawing
-                said = "async (said) => (await import('/js/fields.js')).inLabels(said)"
-                assert opened.text("#sentence") == page.evaluate(said, rejection_of(question))
+                message = "async (said) => (await import('/js/fields.js')).inLabels(said)"
+                assert opened.text("#sentence") == page.evaluate(message, rejection_of(question))
             continue
         opened.settled()
         if "displacement_m" in question:  # asked for once the block is known to slide
@@ -512,13 +512,13 @@ def test_rates_and_losses_are_of_the_same_kinds_and_reject_the_same_blocks(
         if expected.numbers in ((), UNSTABLE_AT_REST):
             with pytest.raises(RbfragError) as rejected:
                 ask(block, job)
-            told = str(rejected.value)
+            document = str(rejected.value)
             assert (
-                (expected.numbers == UNSTABLE_AT_REST and "at rest" in told)
-                or same_reason(told, expected.reason, str)
-                or fails_at_rest(told, expected)
-                or f"model of kind {question.get('kind')}" in told
-            ), (told, expected.reason)
+                (expected.numbers == UNSTABLE_AT_REST and "at rest" in document)
+                or same_reason(document, expected.reason, str)
+                or fails_at_rest(document, expected)
+                or f"model of kind {question.get('kind')}" in document
+            ), (document, expected.reason)
             continue
         kind, mode, p = ask(block, job)
         assert (kind, mode) == (expected.kind, expected.mode), words(question)
@@ -526,23 +526,23 @@ def test_rates_and_losses_are_of_the_same_kinds_and_reject_the_same_blocks(
             assert p == pytest.approx(expected.numbers[0], rel=5e-6), words(question)
 
 
-def fails_at_rest(told: str, expected: Told) -> bool:
+def fails_at_rest(output: str, expected: Reply) -> bool:
     return all(
-        "at rest" in text or "without an earthquake" in text for text in (told, expected.reason)
+        "at rest" in text or "without an earthquake" in text for text in (output, expected.reason)
     )
 
 
 def test_tables_of_blocks_are_read_likewise(tmp_path: Path) -> None:
     source, rows = table(tmp_path, "csv")
     read_rows = read_blocks(source)
-    usable = dict(zip(read_rows.blocks["row"].tolist(), read_rows.blocks["kind"], strict=True))
+    valid = dict(zip(read_rows.blocks["row"].tolist(), read_rows.blocks["kind"], strict=True))
     for place, i in enumerate(rows):
         expected = expected_of(i)
         if QUESTIONS[i]["pgv_m_s"] == 0.6:
             answered = expected.numbers not in ((), UNSTABLE_AT_REST)
-            assert (place in usable) == answered, words(QUESTIONS[i])
-        if place in usable and expected.numbers:
-            assert usable[place] == expected.kind, words(QUESTIONS[i])
+            assert (place in valid) == answered, words(QUESTIONS[i])
+        if place in valid and expected.numbers:
+            assert valid[place] == expected.kind, words(QUESTIONS[i])
 
 
 def test_what_the_table_once_got_wrong() -> None:
@@ -552,8 +552,8 @@ def test_what_the_table_once_got_wrong() -> None:
     expected = rbfrag.predict(block.p2, kr, pgv_m_s=0.8).probability
     for dip in ("dip", "dip_deg", "beta_deg"):
         rows = read_blocks({"height_m": [2.0], "width_m": [0.4], dip: [10.0]}).blocks
-        found = rbfrag.predict(rows["p2_1_s2"], rows["kr"], pgv_m_s=0.8)
-        assert float(found.probability[0]) == pytest.approx(expected, rel=1e-12)
+        prediction = rbfrag.predict(rows["p2_1_s2"], rows["kr"], pgv_m_s=0.8)
+        assert float(prediction.probability[0]) == pytest.approx(expected, rel=1e-12)
     assert expected > 0.99
     slides = rbfrag.predict(
         height_m=np.array([2.5]), width_m=2.5, beta_deg=20.0, phi_deg=32.0, pgv_m_s=0.5
@@ -579,11 +579,11 @@ def test_no_critical_value_of_a_block_that_is_unstable_at_rest(
         for name, value in {**UNSTABLE, **planes}.items()
         for text in (option_of(name), f"{value:g}")
     ]
-    asked = ("--kind", kind) if kind else ()
+    arguments = ("--kind", kind) if kind else ()
     needs_friction = not planes and kind not in (None, "toppling")
     if not needs_friction:
         rejections = [
-            shell(command, record, *words, *asked, expect=2).stderr.strip().splitlines()[-1]
+            shell(command, record, *words, *arguments, expect=2).stderr.strip().splitlines()[-1]
             for command in ("respond", "critical")
         ]
         assert rejections[0] == rejections[1]

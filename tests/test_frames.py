@@ -62,11 +62,11 @@ def test_a_curve_is_given_by_its_file_its_path_or_itself(tmp_path) -> None:
     file.write_text(CURVE)
     (curve,) = rbfrag.read_hazard_curves(file)
     settings = {"component": "single", "model": "bounded-pgv_kr"}
-    for given in (file, str(file), [file], [curve]):
-        assert rbfrag.hazard(given, 3.0, 0.1, **settings).annual_rate == (
+    for inputs in (file, str(file), [file], [curve]):
+        assert rbfrag.hazard(inputs, 3.0, 0.1, **settings).annual_rate == (
             rbfrag.hazard(curve, 3.0, 0.1, **settings).annual_rate
         )
-        standing = rbfrag.survival(given, 3.0, 0.1, kind="toppling", age_years=1e4, **settings)
+        standing = rbfrag.survival(inputs, 3.0, 0.1, kind="toppling", age_years=1e4, **settings)
         assert standing.annual_rate_any == (
             rbfrag.survival(
                 curve, 3.0, 0.1, kind="toppling", age_years=1e4, **settings
@@ -130,13 +130,13 @@ def test_every_answer_is_a_table_and_one_line(tmp_path) -> None:
 def test_a_motion_is_named_by_its_file_or_rejected_by_name(tmp_path, name: str) -> None:
     record = write_at2(tmp_path / "record.AT2", shaking(3))
     motion = rbfrag.read_motions(record)[0]
-    for given in (record, str(record), f"{record}#0"):
-        found = rbfrag.critical(given, p2=3.0)
-        assert found.kr_over_pga == rbfrag.critical(motion, p2=3.0).kr_over_pga
+    for inputs in (record, str(record), f"{record}#0"):
+        result = rbfrag.critical(inputs, p2=3.0)
+        assert result.kr_over_pga == rbfrag.critical(motion, p2=3.0).kr_over_pga
     assert rbfrag.toppling_spectrum(record, 3.0) == rbfrag.toppling_spectrum(motion, 3.0)
-    asked = {"motion": motion, "vertical": None, name: [motion, motion]}
+    request = {"motion": motion, "vertical": None, name: [motion, motion]}
     with pytest.raises(rbfrag.InputError, match=f"^{name} is of type list"):
-        rbfrag.critical(asked["motion"], p2=3.0, vertical=asked["vertical"])
+        rbfrag.critical(request["motion"], p2=3.0, vertical=request["vertical"])
     with pytest.raises(rbfrag.InputError, match="of type float"):
         rbfrag.predict(3.0, 0.1, motion=0.6)
     assert "\n" not in repr(motion)

@@ -26,6 +26,7 @@ from rbfrag.vocabulary.quantities import (
     COMPONENT,
     INPUTS,
     INTENSITY,
+    MEASURED,
     QUANTITIES,
     SCENE,
     SOURCE,
@@ -127,6 +128,21 @@ CASES: dict[str, tuple[dict[str, Any], Any]] = {
     "amplification": (SLAB | PGV, 1.3),
     "amplification_sigma": (SLAB | PGV, 0.4),
     "component": (SLAB | PGV, "rotd50"),
+    **{name: (SLAB | PGV, value) for name, value in
+       (("height_sigma_m", 0.2), ("width_sigma_m", 0.04), ("beta_sigma_deg", 2.0),
+        ("phi_sigma_deg", 0.5))},
+    **dict.fromkeys(("alpha1_sigma_deg", "alpha3_sigma_deg"), (ANGLES | PGV, 1.0)),
+    "r3_sigma_m": (ANGLES | PGV, 0.1),
+    **{name: (SLENDER, value) for name, value in
+       (("s1_sigma_m", 0.2), ("s2_sigma_m", 0.05), ("gamma_sigma_deg", 2.0))},
+    "phi_back_sigma_deg": ({"s1_m": 0.5, "s2_m": 0.15, "gamma_deg": 95.0, "beta_deg": 5.0,
+                            "phi_deg": 25.0, "phi_back_deg": 30.0, **PGA}, 2.0),
+    "base_sigma_deg": (STANDING, 1.0),
+    "back_sigma_deg": (STANDING, 1.0),
+    "water_sigma_m": (SLIDE | {"water_m": 0.3, **PGV}, 0.05),
+    "cohesion_sigma_pa": (SLIDE | PGV, 500.0),  # rejected without a cohesion
+    "density_sigma_kg_m3": (SLIDE | {"water_m": 0.3, "density_kg_m3": 2600.0, **PGV}, 200.0),
+    "gmm_sigma": (SLAB | SCENARIO, 0.4),
 }  # fmt: skip
 ONLY_WITH_SITES = ("pgv_tau",)
 """Fields that change the prediction interval for one earthquake alone."""
@@ -151,13 +167,17 @@ def from_python(question: dict[str, Any]) -> float | str:
         return str(error)
 
 
-def agree(found: float | str | None, expected: float | str, what: str) -> None:
+def agree(result: float | str | None, expected: float | str, subject: str) -> None:
     """Compare P of an interface with that of Python; what one rejects, the other rejects."""
     if isinstance(expected, str):
-        assert isinstance(found, str) or found is None or math.isnan(found), (what, found, expected)
+        assert isinstance(result, str) or result is None or math.isnan(result), (
+            subject,
+            result,
+            expected,
+        )
         return
-    assert isinstance(found, float), (what, found, expected)
-    assert found == pytest.approx(expected, rel=1e-9), what
+    assert isinstance(result, float), (subject, result, expected)
+    assert result == pytest.approx(expected, rel=1e-9), subject
 
 
 def changed(name: str) -> dict[str, Any]:
@@ -166,7 +186,7 @@ def changed(name: str) -> dict[str, Any]:
 
 
 def test_every_field_of_a_question_has_a_case() -> None:
-    every = dict.fromkeys((*BLOCK, *COMMON, *INTENSITY, *SCENE, *SOURCE, *COMPONENT))
+    every = dict.fromkeys((*BLOCK, *MEASURED, *COMMON, *INTENSITY, *SCENE, *SOURCE, *COMPONENT))
     assert {*every} - {*CASES} == {"block", "gmm"}  # a shape as an object, and a file
 
 
@@ -180,8 +200,8 @@ def test_a_keyword_changes_the_answer_or_is_rejected(name: str) -> None:
         return
     before, after = from_python(question), from_python(changed(name))
     if before == after and isinstance(after, float):
-        told = rbfrag.predict(**changed(name)).warnings
-        assert any(name in text and "not used" in text for text in told), (name, told)
+        document = rbfrag.predict(**changed(name)).warnings
+        assert any(name in text and "not used" in text for text in document), (name, document)
         return
     assert before != after, name
     for alias in {column_of(name), word_of(name), *INPUTS[name].aliases}:
@@ -203,8 +223,8 @@ def test_an_option_answers_as_the_keyword(shell: Shell, name: str) -> None:
     expected = from_python(changed(name))
     status = 2 if isinstance(expected, str) else 0
     result = shell("predict", *options, *flags, "--json", expect=status)
-    found = result.stderr if status else json.loads(result.stdout)["probability"]
-    agree(found, expected, name)
+    answer = result.stderr if status else json.loads(result.stdout)["probability"]
+    agree(answer, expected, name)
 
 
 @pytest.mark.parametrize("name", CASES)
@@ -221,20 +241,20 @@ def test_requests_answer_as_the_keyword(client: TestClient, name: str) -> None:
         lambda: client.post("/v1/predict", json=keywords),
     ):
         answer = ask()
-        found = answer.json().get("probability", answer.json().get("detail"))
-        agree(found, expected, f"{name}: {answer.json()}")
+        reply = answer.json().get("probability", answer.json().get("detail"))
+        agree(reply, expected, f"{name}: {answer.json()}")
     lists = {field: [value] if QUANTITIES[field].unit or field in BLOCK
              else value for field, value in keywords.items()}  # fmt: skip
     if any(isinstance(value, list) for value in lists.values()):
         answer = client.post("/v1/predict", json=lists)
         document = answer.json()
-        found = document["probability"][0] if answer.status_code == 200 else document["detail"]
-        agree(found, expected, name)
+        reply = document["probability"][0] if answer.status_code == 200 else document["detail"]
+        agree(reply, expected, name)
 
 
 def one_row(question: dict[str, Any], header: str, value: Any, name: str) -> dict[str, list[Any]]:
-    others = {column_of(field): [cell] for field, cell in without(question, name).items()}
-    return {**others, header: [value]}
+    rest = {column_of(field): [cell] for field, cell in without(question, name).items()}
+    return {**rest, header: [value]}
 
 
 def aliases_of(name: str) -> list[str]:
@@ -258,8 +278,8 @@ def test_a_column_answers_as_the_keyword_by_each_of_its_names(name: str) -> None
         cell = "no" if name == "back_fracture" else value
         if alias == "no_back":
             cell = "yes"
-        found = table_answer(one_row(question, alias, cell, name))
-        agree(found, expected, f"{alias}: {found}")
+        result = table_answer(one_row(question, alias, cell, name))
+        agree(result, expected, f"{alias}: {result}")
 
 
 def rows_of(table: str) -> list[dict[str, str]]:
@@ -280,9 +300,9 @@ def test_pasted_text_answers_as_the_keyword(open_page: Any) -> None:
         with page.expect_response(lambda r: "v1/table" in r.url, timeout=90_000) as waited:
             page.click("#table-ask")
         document = waited.value.json()
-        found: float | str = document.get("detail", "")
+        answer: float | str = document.get("detail", "")
         if waited.value.ok:
             (row, *_) = rows_of(document["table"])
-            found = float(row["probability"]) if row["probability"] else row["reason"]
-        agree(found, from_python(changed(name)), name)
+            answer = float(row["probability"]) if row["probability"] else row["reason"]
+        agree(answer, from_python(changed(name)), name)
     opened.complaints.clear()  # the browser reports requests that are rejected

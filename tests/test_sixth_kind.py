@@ -93,7 +93,7 @@ CAMPAIGN = PaddedCampaign("padded")
 METHOD = '''
 """The method of pads: logistic in ln(x/y) and in the thickness."""
 
-from rbfrag.fragility import fits, method
+from rbfrag.fragility import method
 from rbfrag.fragility.method import BlockParameters, Form, LinearPredictor, Method
 
 
@@ -109,13 +109,12 @@ METHOD = Method(
     ),
     link=method.LOGIT,
     forms={"pgv": Form(("b0", "b_ln_x_over_y", "b_pad"), _eta, 0)},
-    reads="outcomes",
     meaning="probability that the block on pads fails",
-    fit=fits.outcomes,
+    fit="outcomes",
 )
 '''
 
-ASKED = """
+INPUTS = """
 import json
 import numpy as np
 import rbfrag
@@ -178,9 +177,9 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
         ("solver/kinds.py", '        KindSpec(\n            "rocking"', FACTS),
     ):
         text = (PACKAGE / name).read_text(encoding="utf-8")
-        head, found, rest = text.partition(mark)
-        assert found
-        text = f"{head}{found}{line}{rest}" if line == FIELD else f"{head}{line}{found}{rest}"
+        head, result, rest = text.partition(mark)
+        assert result
+        text = f"{head}{result}{line}{rest}" if line == FIELD else f"{head}{line}{result}{rest}"
         (folder / "rbfrag" / name).unlink()
         (folder / "rbfrag" / name).write_text(text, encoding="utf-8")
     samples = shaking(3)
@@ -197,30 +196,30 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def run(folder: Path, *arguments: str) -> str:
-    done = subprocess.run(
+    process = subprocess.run(
         [sys.executable, *arguments], cwd=folder, capture_output=True, text=True, check=False,
         env={**os.environ, "PYTHONPATH": str(folder), "COLUMNS": "200"},
     )  # fmt: skip
-    assert done.returncode == 0, done.stderr
-    return done.stdout
+    assert process.returncode == 0, process.stderr
+    return process.stdout
 
 
 def test_it_answers_by_every_door(folder: Path) -> None:
-    told = json.loads(run(folder, "-c", ASKED))
-    assert told["outcomes"] == ["toppled", "stable"]
-    assert "no critical values of kind padded are computed" in told["rejected"]
-    assert told["stored"] == [12 * 2 * 4] * 3
-    kind, method, name = told["model"]
+    document = json.loads(run(folder, "-c", INPUTS))
+    assert document["outcomes"] == ["toppled", "stable"]
+    assert "no critical values of kind padded are computed" in document["rejected"]
+    assert document["stored"] == [12 * 2 * 4] * 3
+    kind, method, name = document["model"]
     assert (kind, method) == ("padded", "pads")
-    thin, thick = told["single"]
+    thin, thick = document["single"]
     assert 1.0 > thin > thick > 0.0
-    assert told["array"] == pytest.approx([thin, thick], rel=1e-12)
-    assert told["http"].get("probability") == thick, told["http"]
-    assert (told["http"]["kind"], told["http"]["model"]) == ("padded", name)
+    assert document["array"] == pytest.approx([thin, thick], rel=1e-12)
+    assert document["http"].get("probability") == thick, document["http"]
+    assert (document["http"]["kind"], document["http"]["model"]) == ("padded", name)
     shell = ("-m", "rbfrag.cli.main")
-    asked = ("predict", "--kind", "padded", "--p2", "3", "--kr", "0.3", "--pgv", "0.6")
+    command = ("predict", "--kind", "padded", "--p2", "3", "--kr", "0.3", "--pgv", "0.6")
     answer = json.loads(
-        run(folder, *shell, *asked, "--pad", "0.005", "--db", "motions.db", "--json")
+        run(folder, *shell, *command, "--pad", "0.005", "--db", "motions.db", "--json")
     )
     assert answer["probability"] == thick
     table = "kind,p2,kr,Pads [mm],PGV [m/s]\npadded,3,0.3,1,0.6\npadded,3,0.3,5,0.6\n"

@@ -21,31 +21,19 @@ from rbfrag.vocabulary.quantities import (
 )
 
 GROUPS: list[tuple[type, Collection[str]]] = [
-    (fields.NumberFields, quantities.NUMBERS),
-    (fields.FailureFields, quantities.FAILURE),
-    (fields.ShapeFields, quantities.SHAPE),
-    (fields.PlaneFields, quantities.PLANES),
-    (fields.SpaceFields, quantities.SPACE),
-    (fields.JointFields, quantities.JOINT),
-    (fields.ScatterFields, quantities.SCATTER),
     (fields.BlockFields, quantities.BLOCK),
     (fields.MeasureFields, quantities.INTENSITY),
     (fields.ShakingFields, quantities.SHAKING),
     (fields.SourceFields, quantities.SOURCE),
-    (fields.ComponentFields, quantities.COMPONENT),
     (fields.WholeFields, quantities.COMMON),
-    (fields.AtRestFields, quantities.AT_REST),
     (fields.AnsweringFields, quantities.ANSWERING),
     (fields.RangeFields, quantities.RANGE),
-    (fields.RequestFields, quantities.REQUEST),
-    (fields.RecordFields, quantities.RECORD),
-    (fields.ArrayFields, quantities.ARRAYS),
     (fields.QuestionFields, quantities.QUESTION),
     (fields.BlockKeywords, quantities.BLOCKS),
 ]
 
 
-@pytest.mark.parametrize(("types", "names"), GROUPS, ids=lambda each: getattr(each, "__name__", ""))
+@pytest.mark.parametrize(("types", "names"), GROUPS, ids=lambda item: getattr(item, "__name__", ""))
 def test_types_are_declared_for_the_same_inputs(types: type, names: Collection[str]) -> None:
     assert {*types.__annotations__} == {*names}
 
@@ -56,10 +44,10 @@ def test_the_vocabulary_loads_no_library(module: str) -> None:
         f"import sys; before = set(sys.modules); import rbfrag.vocabulary.{module}; "
         "print(*set(sys.modules) - before)"
     )
-    done = subprocess.run(
+    process = subprocess.run(
         [sys.executable, "-c", program], capture_output=True, text=True, check=True
     )
-    loaded = set(done.stdout.split())
+    loaded = set(process.stdout.split())
     assert len(loaded) <= 40
     assert not loaded & {"numpy", "typing", "re", "dataclasses"}
 
@@ -68,7 +56,7 @@ def test_every_name_and_alias_means_one_quantity() -> None:
     for name in INPUTS:
         assert name_of(word_of(name)) == name
         assert option_of(name).startswith("--")
-    aliases = [alias for each in INPUTS.values() for alias in each.aliases if alias != "block"]
+    aliases = [alias for value in INPUTS.values() for alias in value.aliases if alias != "block"]
     assert len(aliases) == len({*aliases})
 
 

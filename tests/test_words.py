@@ -36,11 +36,10 @@ INSTEAD = {
 """Words that no identifier may contain, each with what to say instead."""
 
 WORDS = {word: instead for words, instead in INSTEAD.items() for word in words.split()}
-WHOLE = {"Ground": "excitation", "Starts": "excursion table"}
+COMPLETE = {"Ground": "excitation", "Starts": "excursion table"}
 """The same of whole identifiers: ground motion is the field's own word."""
 
 EXCEPTIONS = {
-    "connection_made": "asyncio calls a protocol's method by this name",
     "DatabaseNotFoundError": "a public error: scripts catch it by this name",
     "found": {
         "campaign/summary.py": "a key of the JSON answer of `simulate`",
@@ -82,30 +81,32 @@ def repeated_classes(sources: Mapping[str, str]) -> list[str]:
         for node in ast.walk(ast.parse(source)):
             if isinstance(node, ast.ClassDef):
                 homes.setdefault(node.name, []).append(f"{where}:{node.lineno}")
-    return [f"{name}: {', '.join(places)}" for name, places in homes.items() if len(places) > 1]
+    return [
+        f"{name}: {', '.join(positions)}" for name, positions in homes.items() if len(positions) > 1
+    ]
 
 
 def wrong_names(source: str, where: str) -> list[str]:
     """Return the identifiers of a source that are not in the field's terms."""
-    found = []
+    values = []
     for name, line in identifiers(ast.parse(source)):
         reason = EXCEPTIONS.get(name, {})
         if isinstance(reason, str) or where in reason:
             continue
         instead = [WORDS[word] for word in sorted(words_of(name) & set(WORDS))]
-        instead += [WHOLE[name]] if name in WHOLE else []
-        found += [f"{where}:{line}: {name} (instead: {'; '.join(instead)})"] if instead else []
-    return found
+        instead += [COMPLETE[name]] if name in COMPLETE else []
+        values += [f"{where}:{line}: {name} (instead: {'; '.join(instead)})"] if instead else []
+    return values
 
 
 def test_names_are_the_terms_of_the_field() -> None:
-    found = [
+    values = [
         text
         for path in SOURCES
         if "versions" not in path.parts  # migrations tell what the tables were once called
         for text in wrong_names(path.read_text(), path.relative_to(ROOT / "rbfrag").as_posix())
     ]
-    assert not found, "\n".join(found)
+    assert not values, "\n".join(values)
 
 
 def test_the_name_of_a_class_has_one_meaning() -> None:
@@ -217,27 +218,27 @@ def helps_of(command: Any, words: tuple[str, ...]) -> Iterator[tuple[str, str]]:
 
 
 def test_help_is_in_the_terms_of_the_field() -> None:
-    found = [
+    values = [
         f"{name}: {', '.join(wrong)}"
         for name, text in helps_of(typer.main.get_command(app), ("rbfrag",))
         if (wrong := avoided_words(text))
     ]
-    found += [
+    values += [
         f"{name}: {', '.join(wrong)}"
         for name, quantity in QUANTITIES.items()
         if (wrong := avoided_words(f"{quantity.help(option_of)} {quantity.prompt}"))
     ]
-    assert not found, "\n".join(found)
+    assert not values, "\n".join(values)
 
 
 def test_errors_are_in_the_terms_of_the_field() -> None:
-    found = [
+    values = [
         f"{path.relative_to(ROOT)}:{line}: {', '.join(wrong)}: {text}"
         for path in SOURCES
         for line, text in texts_of_errors(path.read_text())
         if (wrong := avoided_words(text))
     ]
-    assert not found, "\n".join(found)
+    assert not values, "\n".join(values)
 
 
 @pytest.mark.parametrize(

@@ -38,10 +38,10 @@ def main(arguments: Sequence[str] | None = None) -> dict[str, Any]:
     options.add_argument("--only", nargs="+", choices=PARTS, default=PARTS)
     options.add_argument("--out", type=Path, help="JSON file for the figures")
     chosen = options.parse_args(arguments)
-    known = recordings(chosen.records)
-    found: dict[str, Any] = {
-        "records": len(known),
-        "with_vertical": sum(recording.vertical is not None for recording in known),
+    records = recordings(chosen.records)
+    results: dict[str, Any] = {
+        "records": len(records),
+        "with_vertical": sum(recording.vertical is not None for recording in records),
         "seed": chosen.seed,
     }
     for part in PARTS:
@@ -50,20 +50,28 @@ def main(arguments: Sequence[str] | None = None) -> dict[str, Any]:
         started = time.process_time()
         # every part draws for itself: the same with the others or without
         rng = np.random.default_rng([chosen.seed, PARTS.index(part)])
-        found[part] = STUDIES[part](known, chosen, rng)
-        found[part]["processor_s"] = time.process_time() - started
-        show(part, found[part])
+        results[part] = STUDIES[part](records, chosen, rng)
+        results[part]["processor_s"] = time.process_time() - started
+        show(part, results[part])
     print(f"\n{machine_sentence()}")
     if chosen.out is not None:
-        chosen.out.write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
-    return found
+        chosen.out.write_text(json.dumps(results, indent=1) + "\n", encoding="utf-8")
+    return results
+
+
+def _mixed(records: list[Recording], rng: np.random.Generator, number: int = 10**6) -> list[Any]:
+    """Combinations in random order, every fourth with its vertical."""
+    flat = choose(records, number, rng, with_vertical=False)
+    up = choose(records, number // 3, rng, with_vertical=True)
+    together = [*flat, *up]
+    return [together[i] for i in rng.permutation(len(together))]
 
 
 def _combinations(
-    known: list[Recording], chosen: argparse.Namespace, rng: np.random.Generator
+    records: list[Recording], chosen: argparse.Namespace, rng: np.random.Generator
 ) -> dict[str, Any]:
     return {
-        name: combinations.study(choose(known, number, rng, with_vertical=up))
+        name: combinations.study(choose(records, number, rng, with_vertical=up))
         for name, number, up in (
             ("horizontal", chosen.combinations, False),
             ("with vertical", chosen.vertical, True),
@@ -72,59 +80,29 @@ def _combinations(
     }
 
 
-def _mixed(known: list[Recording], rng: np.random.Generator, number: int) -> list[Any]:
-    """Combinations in random order, every fourth with its vertical."""
-    flat = choose(known, number, rng, with_vertical=False)
-    up = choose(known, number // 3, rng, with_vertical=True)
-    together = [*flat, *up]
-    return [together[i] for i in rng.permutation(len(together))]
-
-
-def _islands(
-    known: list[Recording], chosen: argparse.Namespace, rng: np.random.Generator
-) -> dict[str, Any]:
-    return islands.study(_mixed(known, rng, 10**6), chosen.islands, chosen.values)
-
-
-def _intervals(
-    known: list[Recording], chosen: argparse.Namespace, rng: np.random.Generator
-) -> dict[str, Any]:
-    return intervals.study(_mixed(known, rng, 10**6), chosen.intervals, rng)
-
-
-def _borders(
-    known: list[Recording], chosen: argparse.Namespace, rng: np.random.Generator
-) -> dict[str, Any]:
-    return borders.study(_mixed(known, rng, 10**6)[: chosen.borders], rng)
-
-
-def _accuracy(
-    known: list[Recording], chosen: argparse.Namespace, rng: np.random.Generator
-) -> dict[str, Any]:
-    return accuracy.study(known[:: chosen.every], chosen.strengths, rng)
-
-
-def _digits(
-    known: list[Recording], chosen: argparse.Namespace, rng: np.random.Generator
-) -> dict[str, Any]:
-    return digits.study(_mixed(known, rng, 10**6)[: chosen.digits])
-
-
 STUDIES: dict[str, Callable[..., dict[str, Any]]] = {
     "combinations": _combinations,
-    "islands": _islands,
-    "intervals": _intervals,
-    "borders": _borders,
-    "accuracy": _accuracy,
-    "digits": _digits,
+    "islands": lambda records, chosen, rng: islands.study(
+        _mixed(records, rng), chosen.islands, chosen.values
+    ),
+    "intervals": lambda records, chosen, rng: intervals.study(
+        _mixed(records, rng), chosen.intervals, rng
+    ),
+    "borders": lambda records, chosen, rng: borders.study(
+        _mixed(records, rng)[: chosen.borders], rng
+    ),
+    "accuracy": lambda records, chosen, rng: accuracy.study(
+        records[:: chosen.every], chosen.strengths, rng
+    ),
+    "digits": lambda records, chosen, rng: digits.study(_mixed(records, rng)[: chosen.digits]),
 }
 
 
-def show(name: str, found: dict[str, Any], indent: str = "") -> None:
+def show(name: str, results: dict[str, Any], indent: str = "") -> None:
     """Print figures as lines, nested ones indented, lists by their length and first entries."""
     print(f"{indent}{name}", flush=True)
     indent += "  "
-    for key, value in found.items():
+    for key, value in results.items():
         label = key.replace("_", " ")
         if isinstance(value, dict):
             show(label, value, indent)

@@ -11,19 +11,22 @@ import numpy as np
 
 from benchmarks.certify.recordings import Recording
 from benchmarks.extended.toppling import truth
-from rbfrag.bench.cases import STRENGTHS
+from rbfrag.bench.peers import STRENGTHS
 from rbfrag.solver.excitation import excitation
 from rbfrag.solver.results import DEFAULT_P2, POLARITIES
 from rbfrag.solver.toppling_run import OUTCOMES, simulate
 
 
 def study(
-    known: Sequence[Recording], strengths: int, rng: np.random.Generator, seconds: float = math.inf
+    records: Sequence[Recording],
+    strengths: int,
+    rng: np.random.Generator,
+    seconds: float = math.inf,
 ) -> dict[str, Any]:
     """Run every record, both polarities, every p², and so many k_r/PGA drawn in each.
 
     Args:
-        known: records; their verticals are not used.
+        records: records; their verticals are not used.
         strengths: k_r/PGA drawn evenly in the logarithm, one in each of so many equal parts.
         rng: draws.
         seconds: processor time after which the study ends with what it has.
@@ -36,7 +39,7 @@ def study(
     low, high = np.log(STRENGTHS)
     edges = np.linspace(low, high, strengths + 1)
     started = time.process_time()
-    for recording in known:
+    for recording in records:
         if time.process_time() - started > seconds:
             break
         for polarity in POLARITIES:
@@ -69,7 +72,7 @@ def study(
                         names.append(f"{name}: peak {true.peak_rad:.3g} off by {relative[-1]:.1e}")
     above = np.array(of_estimate) > 1.0
     return {
-        "records": len(known),
+        "records": len(records),
         "runs": runs,
         "never_lift": never,
         "stay": stays,

@@ -10,7 +10,6 @@ import numpy as np
 from benchmarks.certify.recordings import MAP_DEPTH, Combination
 from benchmarks.extended.toppling import truth
 from rbfrag.solver.excitation import Excitation
-from rbfrag.solver.search.critical import critical
 from rbfrag.solver.toppling_run import OUTCOMES, runner
 
 DISTANCES = tuple(10.0**-n for n in range(3, 14))
@@ -62,31 +61,28 @@ def study(combinations: Sequence[Combination], rng: np.random.Generator) -> dict
     wrong: list[str] = []
     borders = 0
     deviations: list[float] = []
-    for one in combinations:
-        result = critical(
-            one.recording.motion, p2=one.p2, vertical=one.vertical, polarity=one.polarity,
-            full_map=True, map_depth=MAP_DEPTH,
-        )  # fmt: skip
+    for combination in combinations:
+        result = combination.search(full_map=True, map_depth=MAP_DEPTH)
         if result.status != "found" or result.lower is None or result.upper is None:
             continue
         # without certificate the upper end is K_up; above the lower one there is a border, too
         upper = result.upper if result.certified else result.lower * (1.0 + 1e-9)
-        excited = one.excited()
+        excited = combination.excited()
         pairs = [(result.lower * excited.pga_g, upper * excited.pga_g)]
-        said = result.intervals.outcome
-        for m in rng.permutation(max(len(said) - 2, 0)).tolist():
+        outcomes = result.intervals.outcome
+        for m in rng.permutation(max(len(outcomes) - 2, 0)).tolist():
             if len(pairs) > OF_ONE_MAP:
                 break
-            ends = {said[m], said[m + 2]}
-            if said[m + 1] == "undecided" and ends == {"safe", "topples"}:
+            ends = {outcomes[m], outcomes[m + 2]}
+            if outcomes[m + 1] == "undecided" and ends == {"safe", "topples"}:
                 low = float(result.intervals.k_lo[m + 1]) * excited.pga_g
                 high = float(result.intervals.k_hi[m + 1]) * excited.pga_g
-                pairs.append((low, high) if said[m] == "topples" else (high, low))
-        run = runner(excited, p2=one.p2)
+                pairs.append((low, high) if outcomes[m] == "topples" else (high, low))
+        run = runner(excited, p2=combination.p2)
         for topples, stays in pairs:
-            critical_kr = border(excited, one.p2, topples, stays)
+            critical_kr = border(excited, combination.p2, topples, stays)
             if critical_kr is None:
-                wrong.append(f"{one.name}: the reference sees no border at {topples!r}")
+                wrong.append(f"{combination.name}: the reference sees no border at {topples!r}")
                 continue
             borders += 1
             if topples == pairs[0][0]:
@@ -95,7 +91,7 @@ def study(combinations: Sequence[Combination], rng: np.random.Generator) -> dict
                 for side in (-1.0, 1.0):
                     kr = critical_kr[0] * (1.0 + side * distance)
                     mine = OUTCOMES[run(kr).outcome].value
-                    true = truth(excited, p2=one.p2, kr=kr).outcome
+                    true = truth(excited, p2=combination.p2, kr=kr).outcome
                     if mine == true:
                         table[distance]["same"] += 1
                     elif mine == "undetermined":
@@ -103,7 +99,9 @@ def study(combinations: Sequence[Combination], rng: np.random.Generator) -> dict
                     else:
                         table[distance]["other"] += 1
                     if mine != true and (distance >= PROMISED or mine != "undetermined"):
-                        wrong.append(f"{one.name}: k_r {kr!r} {mine}, not {true} ({distance:g})")
+                        wrong.append(
+                            f"{combination.name}: k_r {kr!r} {mine}, not {true} ({distance:g})"
+                        )
     return {
         "combinations": len(combinations),
         "borders": borders,

@@ -10,7 +10,6 @@ import numpy as np
 
 from benchmarks.certify.recordings import Combination
 from rbfrag.solver.search.certified import keeps_order
-from rbfrag.solver.search.critical import critical
 
 
 def study(combinations: Sequence[Combination]) -> dict[str, Any]:
@@ -20,31 +19,28 @@ def study(combinations: Sequence[Combination]) -> dict[str, Any]:
         Counts by what came out, greatest width of a bracket, processor time of a whole
         `critical` call [ms], names of combinations that should have been certified.
     """
-    first = combinations[0]
-    critical(first.recording.motion, p2=first.p2, vertical=first.vertical)  # compiles
+    combinations[0].search()  # compiles
     counts = {"found": 0, "below_limit": 0, "no_motion": 0, "outside_model": 0}
     certified = ordered = slivers = 0
     missed: list[str] = []
     rejected: list[str] = []
     widths: list[float] = []
     seconds: list[float] = []
-    for one in combinations:
+    for combination in combinations:
         started = time.process_time()
-        result = critical(
-            one.recording.motion, p2=one.p2, vertical=one.vertical, polarity=one.polarity
-        )
+        result = combination.search()
         seconds.append(time.process_time() - started)
         counts[result.status] += 1
         if result.status == "outside_model":
             continue
         certified += result.certified
         slivers += bool(result.undecided)
-        if keeps_order(one.excited()):
+        if keeps_order(combination.excited()):
             ordered += 1
             if not result.certified:
-                missed.append(one.name)
+                missed.append(combination.name)
         elif not result.certified:
-            rejected.append(one.name)
+            rejected.append(combination.name)
         if result.upper is not None and result.lower is not None:
             widths.append((result.upper - result.lower) / result.upper)
     median, ninety, ninety_nine, greatest = np.quantile(seconds, (0.5, 0.9, 0.99, 1.0)) * 1e3

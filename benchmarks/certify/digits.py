@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from benchmarks.certify.recordings import Combination
-from rbfrag.solver.search.critical import critical
 
 ROUNDED_TO_G = 1e-6
 """To about this the samples of published records are rounded [g]."""
@@ -19,13 +18,12 @@ def study(combinations: Sequence[Combination]) -> dict[str, Any]:
     """Round the samples of every record and search again."""
     exact: list[float] = []
     resolved: list[float] = []
-    for one in combinations:
-        motion = one.recording.motion
-        samples = np.round(motion.acceleration_g / ROUNDED_TO_G) * ROUNDED_TO_G
-        rounded = replace(motion, acceleration_g=samples)
+    for combination in combinations:
+        motion = combination.recording.motion
+        at_digits = np.round(motion.acceleration_g / ROUNDED_TO_G) * ROUNDED_TO_G
+        rounded = replace(motion, acceleration_g=at_digits)
         first, second = (
-            critical(m, p2=one.p2, vertical=one.vertical, polarity=one.polarity, full_map=True)
-            for m in (motion, rounded)
+            combination.search(samples, full_map=True) for samples in (motion, rounded)
         )
         if first.kr is not None and second.kr is not None:
             exact.append(abs(first.kr - second.kr) / motion.pga_g)

@@ -25,8 +25,14 @@ Case = tuple[str, GroundMotion, GroundMotion | None, Polarity, float]
 def cases(combinations: Sequence[Combination], rng: np.random.Generator) -> Iterator[Case]:
     """Real combinations and made-up motions in turn, without end but for the real ones."""
     makers = list(MAKERS.items())
-    for number, one in enumerate(combinations):
-        yield "real", one.recording.motion, one.vertical, one.polarity, one.p2
+    for number, combination in enumerate(combinations):
+        yield (
+            "real",
+            combination.recording.motion,
+            combination.vertical,
+            combination.polarity,
+            combination.p2,
+        )
         name, make = makers[number % len(makers)]
         motion = make(rng)
         up = vertical_of(motion, rng) if number % 2 else None
@@ -35,7 +41,7 @@ def cases(combinations: Sequence[Combination], rng: np.random.Generator) -> Iter
 
 
 def study(
-    combinations: Sequence[Combination], wanted: int, rng: np.random.Generator
+    combinations: Sequence[Combination], limit: int, rng: np.random.Generator
 ) -> dict[str, Any]:
     """Check intervals until as many are done; half lie in maps, half are asked for directly.
 
@@ -45,11 +51,11 @@ def study(
     """
     in_maps: dict[str, Count] = {}
     direct: dict[str, Count] = {}
-    asked = 0
+    intervals = 0
     wrong: list[str] = []
-    done = 0
+    finished = 0
     for kind, motion, up, polarity, p2 in cases(combinations, rng):
-        if done >= wanted:
+        if finished >= limit:
             break
         result = critical(
             motion,
@@ -64,7 +70,7 @@ def study(
             continue
         excited = excitation(motion, up, polarity)
         pga = excited.pga_g
-        here: list[str] = []
+        contradictions: list[str] = []
         decided = [m for m, w in enumerate(result.intervals.outcome) if w != "undecided"]
         count = in_maps.setdefault(kind, Count())
         for m in rng.choice(decided, OF_ONE_MAP).tolist():
@@ -74,8 +80,8 @@ def study(
             high = result.intervals.k_hi[m] if rng.random() < 0.3 else ends.max()
             topples = result.intervals.outcome[m] == "topples"
             kr = inner_values(excited, low * pga, high * pga, rng)
-            here += count.check(excited, p2, low * pga, high * pga, topples, kr)
-            done += 1
+            contradictions += count.check(excited, p2, low * pga, high * pga, topples, kr)
+            finished += 1
         count = direct.setdefault(kind, Count())
         top = max(result.k_up_over_pga or 0.02, 0.02) * pga
         for _ in range(OF_ONE_MAP):
@@ -85,18 +91,20 @@ def study(
                 m = rng.choice(decided)
                 low = pga * rng.uniform(result.intervals.k_lo[m], result.intervals.k_hi[m])
             high = low * (1.0 + np.exp(rng.uniform(np.log(1e-7), np.log(0.3))))
-            asked += 1
+            intervals += 1
             answer = verdict_on(excited, p2, low, high)
             if answer is None:
                 continue
             kr = inner_values(excited, low, high, rng)
-            here += count.check(excited, p2, low, high, answer, kr)
-            done += 1
-        wrong += [f"{kind} {motion.label} p2={p2!r} {polarity}: {sentence}" for sentence in here]
+            contradictions += count.check(excited, p2, low, high, answer, kr)
+            finished += 1
+        wrong += [
+            f"{kind} {motion.label} p2={p2!r} {polarity}: {sentence}" for sentence in contradictions
+        ]
     return {
-        "intervals": done,
+        "intervals": finished,
         "of_maps": {kind: asdict(count) for kind, count in in_maps.items()},
-        "asked_for": asked,
+        "asked_for": intervals,
         "direct": {kind: asdict(count) for kind, count in direct.items()},
         "contradictions": wrong,
     }

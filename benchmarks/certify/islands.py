@@ -10,7 +10,6 @@ import numpy as np
 from benchmarks.certify.recordings import MAP_DEPTH, Combination
 from rbfrag.solver.critical_result import CriticalResult
 from rbfrag.solver.integrator.toppling_kernel import STABLE, TOPPLED
-from rbfrag.solver.search.critical import critical
 from rbfrag.solver.toppling_run import runner
 
 WIDE = 1e-6
@@ -26,22 +25,22 @@ def safe_islands(result: CriticalResult) -> list[float]:
     first: float | None = None
     last = 0.0
     seen_toppling = False
-    for low, high, what in zip(
+    for low, high, outcome in zip(
         result.intervals.k_lo.tolist(), result.intervals.k_hi.tolist(), result.intervals.outcome,
         strict=True,
     ):  # fmt: skip
-        if what == "topples":
+        if outcome == "topples":
             if seen_toppling and first is not None and last - first > WIDE:
                 widths.append(last - first)
             seen_toppling = True
             first = None
-        elif what == "safe":
+        elif outcome == "safe":
             first = low if first is None else first
             last = high
     return widths
 
 
-def study(combinations: Sequence[Combination], wanted: int, values: int) -> dict[str, Any]:
+def study(combinations: Sequence[Combination], limit: int, values: int) -> dict[str, Any]:
     """Map combinations until `wanted` with islands are found, and run `values` blocks in each.
 
     Half of the blocks are spread evenly in k_r, half in its logarithm.
@@ -49,14 +48,11 @@ def study(combinations: Sequence[Combination], wanted: int, values: int) -> dict
     looked = mapped = blocks = islands = undetermined = uncertified = higher = 0
     wrong: list[str] = []
     narrowest = np.inf
-    for one in combinations:
-        if mapped == wanted:
+    for combination in combinations:
+        if mapped == limit:
             break
         looked += 1
-        result = critical(
-            one.recording.motion, p2=one.p2, vertical=one.vertical, polarity=one.polarity,
-            full_map=True, map_depth=MAP_DEPTH,
-        )  # fmt: skip
+        result = combination.search(full_map=True, map_depth=MAP_DEPTH)
         gaps = safe_islands(result)
         if not gaps:
             continue
@@ -64,9 +60,9 @@ def study(combinations: Sequence[Combination], wanted: int, values: int) -> dict
         islands += len(gaps)
         uncertified += not result.certified
         narrowest = min(narrowest, *gaps)
-        said = np.array(result.intervals.outcome)
-        excited = one.excited()
-        run = runner(excited, p2=one.p2)
+        outcome_of_interval = np.array(result.intervals.outcome)
+        excited = combination.excited()
+        run = runner(excited, p2=combination.p2)
         bottom = result.search_limit
         top = excited.max_q / excited.pga_g
         half = values // 2
@@ -75,13 +71,17 @@ def study(combinations: Sequence[Combination], wanted: int, values: int) -> dict
         )
         outcomes = np.array([run(r * excited.pga_g).outcome for r in ratios.tolist()])
         blocks += ratios.size
-        at = np.minimum(np.searchsorted(result.intervals.k_hi, ratios), said.size - 1)
+        at = np.minimum(
+            np.searchsorted(result.intervals.k_hi, ratios), outcome_of_interval.size - 1
+        )
         undetermined += int(((outcomes != STABLE) & (outcomes != TOPPLED)).sum())
-        bad = (said[at] == "safe") & (outcomes == TOPPLED)
-        bad |= (said[at] == "topples") & (outcomes == STABLE)
+        bad = (outcome_of_interval[at] == "safe") & (outcomes == TOPPLED)
+        bad |= (outcome_of_interval[at] == "topples") & (outcomes == STABLE)
         wrong += [
-            f"{one.name}: k_r/PGA {ratio!r} is not {what}"
-            for ratio, what in zip(ratios[bad].tolist(), said[at][bad].tolist(), strict=True)
+            f"{combination.name}: k_r/PGA {ratio!r} is not {outcome}"
+            for ratio, outcome in zip(
+                ratios[bad].tolist(), outcome_of_interval[at][bad].tolist(), strict=True
+            )
         ]
         topples = ratios[outcomes == TOPPLED]
         # what brute force alone would have called the critical value

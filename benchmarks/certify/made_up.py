@@ -39,9 +39,9 @@ def jumps(rng: np.random.Generator) -> GroundMotion:
 
 def bad_ends(rng: np.random.Generator) -> GroundMotion:
     """Above most thresholds at the first sample, and not at rest at the last."""
-    whole = noise(rng).acceleration_g
-    first = int(rng.integers(0, whole.size // 2))
-    cut = whole[first : first + int(rng.integers(10, 120))]
+    samples = noise(rng).acceleration_g
+    first = int(rng.integers(0, samples.size // 2))
+    cut = samples[first : first + int(rng.integers(10, 120))]
     return GroundMotion(cut + rng.uniform(0.05, 0.3), 0.01)
 
 

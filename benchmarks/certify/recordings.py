@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -13,8 +14,10 @@ from rbfrag.errors import InputError
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.metadata import read_metadata
 from rbfrag.motions.readers import read_motions
+from rbfrag.solver.critical_result import CriticalResult
 from rbfrag.solver.excitation import Excitation, excitation
 from rbfrag.solver.results import DEFAULT_P2, POLARITIES, Polarity
+from rbfrag.solver.search.critical import critical
 
 MAP_DEPTH = 1e-9
 """Width of k_r/PGA to which maps are made: as fine as the search goes, to be tried hardest."""
@@ -48,6 +51,13 @@ class Combination:
         vertical = ", vertical" if self.with_vertical else ""
         return f"{self.recording.name} {self.polarity} p2={self.p2:g}{vertical}"
 
+    def search(self, motion: GroundMotion | None = None, **options: Any) -> CriticalResult:
+        """Search the critical value of the recording, or of a motion in its place."""
+        return critical(
+            motion or self.recording.motion, p2=self.p2, vertical=self.vertical,
+            polarity=self.polarity, **options,
+        )  # fmt: skip
+
     def excited(self) -> Excitation:
         return excitation(self.recording.motion, self.vertical, self.polarity)
 
@@ -62,11 +72,11 @@ def recordings(folder: str | os.PathLike[str] | None = None) -> list[Recording]:
     table = root / "MANIFEST.csv"
     if not table.is_file():
         raise SystemExit(f"there is no {table}: name the folder in {RECORDS_VARIABLE} or --records")
-    stated = read_metadata(table)
+    metadata = read_metadata(table)
     horizontal: list[tuple[str, str, GroundMotion]] = []
     upward: dict[str, GroundMotion] = {}
     for path in sorted(p for p in root.rglob("*") if p.is_file()):
-        about = stated.file(path)
+        about = metadata.file(path)
         if not about:
             continue
         try:
@@ -90,13 +100,13 @@ def recordings(folder: str | os.PathLike[str] | None = None) -> list[Recording]:
 
 
 def choose(
-    known: list[Recording], number: int, rng: np.random.Generator, *, with_vertical: bool
+    records: list[Recording], number: int, rng: np.random.Generator, *, with_vertical: bool
 ) -> list[Combination]:
     """Draw combinations of recording, polarity and p² without repeating one."""
-    usable = [r for r in known if r.vertical is not None] if with_vertical else known
+    suitable = [r for r in records if r.vertical is not None] if with_vertical else records
     every = [
         Combination(recording, polarity, p2, with_vertical)
-        for recording in usable
+        for recording in suitable
         for polarity in POLARITIES
         for p2 in DEFAULT_P2
     ]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 
-from benchmarks.claims.claim import Claim
+from benchmarks.claims.claim import Claim, agreement_with_reference
 from benchmarks.claims.pulses import pulses_scatter_like_records
 from benchmarks.claims.records import (
     exponent_one,
@@ -14,10 +14,9 @@ from benchmarks.claims.records import (
     pulses_as_bounds,
     rank_of_terms,
     variance_linear,
+    vertical_is_irrelevant,
 )
-from benchmarks.claims.vertical import vertical_is_irrelevant
 from benchmarks.page import ROOT, markdown, parser, report
-from benchmarks.reference_agreement import agreement_with_reference
 from rbfrag.db.engine import opened_database
 from rbfrag.db.motions import motion_rows, suite_names
 from rbfrag.db.queries import combination_table

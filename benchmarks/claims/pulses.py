@@ -68,16 +68,16 @@ def pulses_scatter_like_records(
     sizes = sorted(set(points.p2.tolist()))
     claims = []
     for words, ending in GROUPS:
-        found, pulse = [], []
+        residuals_of_records, pulse = [], []
         for name, make in PULSES.items():
             if not name.endswith(ending):
                 continue
             for period_s in np.geomspace(float(tm.min()), float(tm.max()), periods).tolist():
                 motion = make(amplitude_g, period_s)
                 residuals = _residuals(motion, sizes, intercept, slope)
-                found += residuals
+                residuals_of_records += residuals
                 pulse += [f"{name} {period_s:g}"] * len(residuals)
-        off: FloatArray = np.array(found)
+        off: FloatArray = np.array(residuals_of_records)
         inside = (off >= bottom) & (off <= top)
         value, low, high = cluster_interval(
             np.array(pulse),

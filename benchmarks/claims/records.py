@@ -7,21 +7,14 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import stdtrit
 
-from benchmarks.claims.claim import (
-    LEVEL,
-    Claim,
-    FloatArray,
-    IntArray,
-    cluster_interval,
-    verdict_of,
-)
+from benchmarks.claims.claim import LEVEL, Claim, FloatArray, IntArray, cluster_interval, verdict_of
 from rbfrag.db.rows import CombinationTable
 from rbfrag.errors import FitError
-from rbfrag.fragility.confidence import student_half_width
 from rbfrag.fragility.fit.fitting import fit
 from rbfrag.fragility.measures import TERMS
-from rbfrag.plots.critical_strength import pulse_line
+from rbfrag.plots.critical_strength import pulse_line, vertical_pairs
 
 FEWEST_EVENTS = 5
 
@@ -98,7 +91,7 @@ def one_to_one(table: CombinationTable, *, seed: int) -> list[Claim]:
     points = Points(table)
     report = fit(table, term="pgv", method="wls", seed=seed)
     slope, error = report.coefficients["c1"], report.standard_errors["c1"]
-    reach = student_half_width(0.95, points.clusters - 1) * error
+    reach = float(stdtrit(points.clusters - 1, 0.975)) * error
     ratio = points.ln_y - points.ln_x["pgv"]
     x, y = np.exp(points.ln_x["pgv"]), np.exp(points.ln_y)
     # of both polarities of a motion and size the one that topples the stronger block
@@ -124,7 +117,7 @@ def one_to_one(table: CombinationTable, *, seed: int) -> list[Claim]:
     for claimed, statistic, (value, low, high), n in held:
         within = low > 1.0 - EDGE and high < 1.0 + EDGE
         holds = within if claimed.endswith("edge") else low <= 1.0 <= high
-        own = f"confirmed if the interval lies within {EDGE:g} of 1, refuted if not"
+        criterion = f"confirmed if the interval lies within {EDGE:g} of 1, refuted if not"
         claims.append(
             Claim(
                 claimed,
@@ -132,7 +125,7 @@ def one_to_one(table: CombinationTable, *, seed: int) -> list[Claim]:
                 value,
                 low,
                 high,
-                own if claimed.endswith("edge") else rule,
+                criterion if claimed.endswith("edge") else rule,
                 verdict_of(holds, not holds),
                 n,
                 points.clusters,
@@ -180,10 +173,10 @@ def motion_set(table: CombinationTable, set_of_motion: dict[int, str], *, seed: 
         seed: of draws and permutations.
     """
     points = Points(table)
-    known = np.array([int(m) in set_of_motion for m in points.motion_id])
-    label = np.array([set_of_motion.get(int(m), "") for m in points.motion_id])[known]
-    event = points.event[known]
-    x, y = points.ln_x["pgv"][known], points.ln_y[known]
+    in_a_set = np.array([int(m) in set_of_motion for m in points.motion_id])
+    label = np.array([set_of_motion.get(int(m), "") for m in points.motion_id])[in_a_set]
+    event = points.event[in_a_set]
+    x, y = points.ln_x["pgv"][in_a_set], points.ln_y[in_a_set]
     if np.unique(label).size < 2:
         return []
     intercept, slope = line(x, y)
@@ -217,7 +210,7 @@ def motion_set(table: CombinationTable, set_of_motion: dict[int, str], *, seed: 
             "refuted if p < .05, when sets are dealt out anew to whole earthquakes (each in the "
             "set of most of its motions); otherwise confirmed",
             verdict_of(p >= 0.05, p < 0.05),
-            int(known.sum()),
+            int(in_a_set.sum()),
             int(events.size),
         )
     ]
@@ -225,20 +218,20 @@ def motion_set(table: CombinationTable, set_of_motion: dict[int, str], *, seed: 
 
 def _most_frequent(names: NDArray[np.str_]) -> str:
     """Return the name that occurs most often, of equals the first in the alphabet."""
-    found, count = np.unique(names, return_counts=True)
-    return str(found[np.argmax(count)])
+    unique_names, count = np.unique(names, return_counts=True)
+    return str(unique_names[np.argmax(count)])
 
 
 def pulses_as_bounds(table: CombinationTable, *, seed: int) -> list[Claim]:
     """Test the lines of single pulses as bounds of k_r/PGA against ω_m/p."""
     points = Points(table)
-    stated = (
+    statement = (
         ("rectangular", "is an upper bound", 0.0),
         ("half-sine", "lies near mean + 2 standard deviations", 0.0228),
         ("triangular", "bounds the bulk", 0.5),
     )
     claims = []
-    for name, words, expected in stated:
+    for name, words, expected in statement:
         above = points.kr_over_pga > pulse_line(name, points.frequency_ratio)
 
         def share(i: IntArray, above: NDArray[np.bool_] = above) -> float:
@@ -271,14 +264,16 @@ def pulses_as_bounds(table: CombinationTable, *, seed: int) -> list[Claim]:
     logarithm = np.log(points.frequency_ratio)
     edges = np.linspace(logarithm.min(), logarithm.max(), BINS + 1)
     number = np.clip(np.searchsorted(edges, logarithm, side="right") - 1, 0, BINS - 1)
-    lines = np.array([pulse_line(name, points.frequency_ratio) for name, _, _ in stated])
+    lines = np.array([pulse_line(name, points.frequency_ratio) for name, _, _ in statement])
 
     def nearest(i: IntArray) -> float:
         nearer = []
-        for each in np.unique(number[i]):
-            here = i[number[i] == each]
-            off = np.abs(np.log(lines[:, here].mean(axis=1) / points.kr_over_pga[here].mean()))
-            nearer.append(off.argmin() == len(stated) - 1)
+        for motion in np.unique(number[i]):
+            of_motion = i[number[i] == motion]
+            off = np.abs(
+                np.log(lines[:, of_motion].mean(axis=1) / points.kr_over_pga[of_motion].mean())
+            )
+            nearer.append(off.argmin() == len(statement) - 1)
         return float(np.mean(nearer))
 
     value, low, high = cluster_interval(points.event, nearest, seed=seed)
@@ -363,3 +358,58 @@ def variance_linear(table: CombinationTable, *, seed: int) -> list[Claim]:
             points.clusters,
         )
     ]
+
+
+NEGLIGIBLE = 0.02
+"""Mean change of y, relative, that counts as none."""
+
+
+def vertical_is_irrelevant(
+    without: CombinationTable, with_vertical: CombinationTable, *, seed: int
+) -> list[Claim]:
+    """Test that vertical motion does not change the critical values.
+
+    Args:
+        without: critical values without vertical motion.
+        with_vertical: those with it.
+        seed: of the draws.
+    """
+    pairs = vertical_pairs(without, with_vertical)
+    if np.unique(pairs.event_id.astype(str)).size < 2:
+        return []
+    event, d = pairs.event_id.astype(str), pairs.ln_ratio
+    clusters = int(np.unique(event).size)
+    value, low, high = cluster_interval(event, lambda i: float(d[i].mean()), seed=seed)
+    mean = Claim(
+        "vertical motion does not change critical blocks on average",
+        "mean of ln(y with / y without) of the same motion, polarity and p²; "
+        f"{pairs.one_sided} pairs of which only one was found are left out",
+        value,
+        low,
+        high,
+        f"confirmed if the interval lies within ±{NEGLIGIBLE:g}, refuted if outside",
+        verdict_of(low > -NEGLIGIBLE and high < NEGLIGIBLE, low > NEGLIGIBLE or high < -NEGLIGIBLE),
+        int(d.size),
+        clusters,
+    )
+    points = Points(without)
+    about_line = residual_sd(points.ln_x["pgv"], points.ln_y)
+
+    def share(i: IntArray) -> float:
+        return float(np.mean(d[i] ** 2)) / about_line**2
+
+    value, low, high = cluster_interval(event, share, seed=seed)
+    scatter = Claim(
+        "vertical motion is irrelevant beside the scatter of the fit",
+        f"mean square of ln(y with / y without) over the variance of ln y about the line on PGV "
+        f"(median change {100.0 * float(np.median(np.abs(np.expm1(d)))):.1f} %, 95 % of changes "
+        f"below {100.0 * float(np.quantile(np.abs(np.expm1(d)), 0.95)):.0f} %)",
+        value,
+        low,
+        high,
+        "confirmed if the interval lies below .1, refuted if above",
+        verdict_of(high < 0.1, low > 0.1),
+        int(d.size),
+        clusters,
+    )
+    return [mean, scatter]

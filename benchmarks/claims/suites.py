@@ -46,29 +46,31 @@ def main(arguments: Sequence[str] | None = None) -> None:
     label = np.array([suite[int(motion)] for motion in points.motion_id])
     rows, drawn = [], {}
     for name in SUITES:
-        own = residual[label == name]
+        of_label = residual[label == name]
         value, low, high = cluster_interval(
-            points.event[label == name], lambda i, own=own: float(own[i].mean()), seed=1
+            points.event[label == name],
+            lambda i, of_label=of_label: float(of_label[i].mean()),
+            seed=1,
         )  # type: ignore[misc]
-        drawn[name] = (own, value, low, high)
+        drawn[name] = (of_label, value, low, high)
         motions = len(set(points.motion_id[label == name].tolist()))
         events = len(set(points.event[label == name].tolist()))
         rows.append([
             name, str(motions), str(events), f"{value:+.3f} ({low:+.3f} to {high:+.3f})",
-            f"{own.std():.2f}",
+            f"{of_label.std():.2f}",
         ])  # fmt: skip
     headers = ["suite", "motions", "earthquakes", "mean of ln y off the line on PGV", "scatter"]
-    told = (
+    note = (
         f"{100 * claim.value:.1f} % of the variance; {claim.statistic.rpartition(';')[2].strip()}"
     )
-    report("suites", f"{markdown((headers, rows))}\n\n{told}", write=chosen.write, page=PAGE)
+    report("suites", f"{markdown((headers, rows))}\n\n{note}", write=chosen.write, page=PAGE)
     if chosen.write:
         plot(drawn, FIGURE)
 
 
 def labels(lists: Sequence[Path]) -> Mapping[str, str]:
     """Return the suite of each file, by its name."""
-    found = {}
+    labels_of_motions = {}
     for path in lists:
         with path.open(encoding="utf-8", newline="") as file:
             for row in csv.DictReader(file):
@@ -82,8 +84,8 @@ def labels(lists: Sequence[Path]) -> Mapping[str, str]:
                     suite = SUITES[2]
                 else:
                     suite = SUITES[3]
-                found[Path(row["file"]).name] = suite
-    return found
+                labels_of_motions[Path(row["file"]).name] = suite
+    return labels_of_motions
 
 
 @canvas.in_own_style

@@ -21,7 +21,7 @@ SPLITTER = 134217729.0
 
 
 @njit(inline="always")
-def _whole(high: float, low: float) -> Pair:
+def _quick_two_sum(high: float, low: float) -> Pair:
     s = high + low
     return s, low - (s - high)
 
@@ -35,8 +35,8 @@ def add(a: Pair, b: Pair) -> Pair:
     t = a[1] + b[1]
     v = t - a[1]
     f = (a[1] - (t - v)) + (b[1] - v)
-    s, e = _whole(s, e + t)
-    return _whole(s, e + f)
+    s, e = _quick_two_sum(s, e + t)
+    return _quick_two_sum(s, e + f)
 
 
 @kernel
@@ -64,7 +64,7 @@ def mul(a: Pair, b: Pair) -> Pair:
     yh = t - (t - y)
     yl = y - yh
     e = ((xh * yh - p) + xh * yl + xl * yh) + xl * yl
-    return _whole(p, e + (x * a_low(b) + a_low(a) * y))
+    return _quick_two_sum(p, e + (x * a_low(b) + a_low(a) * y))
 
 
 @njit(inline="always")
@@ -86,7 +86,7 @@ def div(a: Pair, b: Pair) -> Pair:
     r = sub(a, mul(b, (q1, 0.0)))
     q2 = r[0] / b[0]
     r = sub(r, mul(b, (q2, 0.0)))
-    return add(_whole(q1, q2), (r[0] / b[0], 0.0))
+    return add(_quick_two_sum(q1, q2), (r[0] / b[0], 0.0))
 
 
 @kernel
@@ -129,8 +129,8 @@ def arctangent(a: Pair) -> Pair:
     sine, versine = sine_versine(first)
     cosine = sub((1.0, 0.0), versine)
     # tan(x - first) = (a cos - sin)/(cos + a sin): a few 1e-17, its own angle
-    left = div(sub(mul(a, cosine), sine), add(cosine, mul(a, sine)))
-    return add(first, left)
+    correction = div(sub(mul(a, cosine), sine), add(cosine, mul(a, sine)))
+    return add(first, correction)
 
 
 @kernel

@@ -103,11 +103,11 @@ def _run(
 ) -> tuple[int, float, float, int, int]:
     n = k_h.size
     zero = (0.0, 0.0)
-    one = (1.0, 0.0)
+    unity = (1.0, 0.0)
     kr = (kr_high, kr_low)
     p = root((p2, 0.0))
     theta_c = arctangent(kr)
-    c_rest = div(one, root(add(one, mul(kr, kr))))
+    c_rest = div(unity, root(add(unity, mul(kr, kr))))
     s_rest = mul(kr, c_rest)
     # angle of which all later excitation exceeds the tangent: beyond it nothing brings a block back
     border = np.zeros(n)
@@ -133,7 +133,7 @@ def _run(
     for i in range(n - 1):
         if interval_s[i] == 0.0:
             continue
-        whole = mul(p, (interval_s[i], 0.0))
+        span = mul(p, (interval_s[i], 0.0))
         a_start = (k_h[i], 0.0)
         w_start = (w[i], 0.0)
         a_slope = sub((k_h[i + 1], 0.0), a_start)
@@ -164,15 +164,15 @@ def _run(
             if not counted:
                 counted = True
                 moved += 1
-            left = sub(one, at)
-            part = left
-            pieces = math.ceil(whole[0] * left[0] / ph_max)
+            rest = sub(unity, at)
+            part = rest
+            pieces = math.ceil(span[0] * rest[0] / ph_max)
             if pieces > 1:
-                part = div(left, (float(pieces), 0.0))
-            ph = mul(whole, part)
+                part = div(rest, (float(pieces), 0.0))
+            ph = mul(span, part)
             steps += 1
             sine, versine = sine_versine(theta)
-            cosine = sub(one, versine)
+            cosine = sub(unity, versine)
             degree = _series(
                 u, s, c,
                 sub(mul(s_rest, cosine), mul(c_rest, sine)),
@@ -202,9 +202,9 @@ def _run(
                 theta = zero
                 rate = zero
                 continue
-            theta = _value(path, degree + 2, one)
-            rate = div(_value(u, degree + 1, one), ph)
-            at = add(at, part) if pieces > 1 else one
+            theta = _value(path, degree + 2, unity)
+            rate = div(_value(u, degree + 1, unity), ph)
+            at = add(at, part) if pieces > 1 else unity
             if rate[0] > 0.0 and sub(theta_c, theta)[0] < border[i] - CLEAR:
                 return TOPPLED, math.nan, 0.0, moved, steps
             if not (at[0] < 1.0):
@@ -286,7 +286,7 @@ def _value(x: FloatArray, count: int, t: Pair) -> Pair:
 
 
 @kernel
-def _roots(x: FloatArray, count: int, found: FloatArray, most: int) -> int:
+def _roots(x: FloatArray, count: int, roots: FloatArray, most: int) -> int:
     """Find where a polynomial changes sign in (0, 1], in order; return how many, up to `most`.
 
     Roots at 0 itself are divided out.
@@ -342,7 +342,7 @@ def _roots(x: FloatArray, count: int, found: FloatArray, most: int) -> int:
             at_high = _part(x, first, count, (high, 0.0))
             if at_low[0] != 0.0 and (at_high[0] == 0.0 or (at_low[0] > 0.0) != (at_high[0] > 0.0)):
                 t = _closed_in(x, first, count, low, high, at_low[0] > 0.0)
-                found[number, 0], found[number, 1] = t
+                roots[number, 0], roots[number, 1] = t
                 number += 1
             continue
         lows[depth] = middle

@@ -15,17 +15,17 @@ class Row(NamedTuple):
     """One row of the table: what was tried, against what, and how it went.
 
     Args:
-        what: the cases, in few words.
+        subject: the cases, in few words.
         against: what judges, which shares no code with the solver: an integrator, a closed form.
         tried: how many cases.
         wrong: how many with a wrong outcome, or with an error beyond the estimate.
         within: how many within the error estimate, or certified.
-        others: how many without: undetermined, not certified, or without an estimate.
+        undecided: how many without: undetermined, not certified, or without an estimate.
     """
 
-    what: str
+    subject: str
     against: str
     tried: int
     wrong: int
     within: int
-    others: int
+    undecided: int

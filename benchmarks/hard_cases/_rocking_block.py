@@ -47,12 +47,12 @@ def _topples(time_s: FloatArray, k_h: FloatArray, w: FloatArray, p: float, kr: f
     theta = rate = 0.0
     moving = False
     for i in range(time_s.size - 1):
-        whole = p * (time_s[i + 1] - time_s[i])
-        if whole <= 0.0:
+        span = p * (time_s[i + 1] - time_s[i])
+        if span <= 0.0:
             continue
         if not moving and max(k_h[i] - kr * w[i], k_h[i + 1] - kr * w[i + 1]) <= 0.0:
             continue
-        number = max(PARTS, math.ceil(whole / PH))
+        number = max(PARTS, math.ceil(span / PH))
         for j in range(number):
             at, end = j / number, (j + 1) / number
             # an impact or a start divides a step; a few of them at most
@@ -72,7 +72,7 @@ def _topples(time_s: FloatArray, k_h: FloatArray, w: FloatArray, p: float, kr: f
                         moving = True
                         continue
                     moving = True
-                theta1, rate1 = _step(theta_c, theta, rate, whole * part, k0, k1, w0, w1)
+                theta1, rate1 = _step(theta_c, theta, rate, span * part, k0, k1, w0, w1)
                 if theta1 >= 0.0:
                     theta, rate, at = theta1, rate1, end
                     break
@@ -82,7 +82,7 @@ def _topples(time_s: FloatArray, k_h: FloatArray, w: FloatArray, p: float, kr: f
                     mid = 0.5 * (low + high)
                     km = k_h[i] + (at + mid) * (k_h[i + 1] - k_h[i])
                     wm = w[i] + (at + mid) * (w[i + 1] - w[i])
-                    if _step(theta_c, theta, rate, whole * mid, k0, km, w0, wm)[0] >= 0.0:
+                    if _step(theta_c, theta, rate, span * mid, k0, km, w0, wm)[0] >= 0.0:
                         low = mid
                     else:
                         high = mid

@@ -18,15 +18,15 @@ SEED = 77
 
 def rows() -> list[Row]:
     """Run the cases."""
-    wrong = within = others = 0
-    for number, each in enumerate(islice(confined_topples(SEED), COUNT)):
-        answer = each.answer
+    wrong = within = undecided = 0
+    for number, case in enumerate(islice(confined_topples(SEED), COUNT)):
+        answer = case.answer
         if answer.error_estimate is None or answer.outcome is Outcome.UNDETERMINED:
-            others += 1
+            undecided += 1
             continue
-        springs = each.on_springs()
+        springs = case.on_springs()
         falls = answer.outcome is Outcome.TOPPLED
-        if each.ends_as(springs) and (falls or each.is_covered(springs)):
+        if case.ends_as(springs) and (falls or case.is_covered(springs)):
             within += 1
             continue
         wrong += 1
@@ -36,7 +36,7 @@ def rows() -> list[Row]:
             file=sys.stderr,
         )
     return [Row("confined topples to rest or fall", "free block on stiff springs", COUNT, wrong,
-                within, others)]  # fmt: skip
+                within, undecided)]  # fmt: skip
 
 
 if __name__ == "__main__":

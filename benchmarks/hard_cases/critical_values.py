@@ -59,28 +59,28 @@ def of_recordings(rng: np.random.Generator, number: int) -> Iterator[Case]:
     if RECORDS_VARIABLE not in os.environ:
         print(f"{RECORDS_VARIABLE} is not set: no recordings", file=sys.stderr)
         return
-    known = recordings()
-    upward = [each for each in known if each.vertical is not None]
+    records = recordings()
+    upward = [record for record in records if record.vertical is not None]
     for i in range(number):
-        some = upward if i % 2 else known
-        one = some[int(rng.integers(len(some)))]
+        candidates = upward if i % 2 else records
+        recording = candidates[int(rng.integers(len(candidates)))]
         polarity: Polarity = "forward" if rng.integers(2) else "reverse"
         p2 = DEFAULT_P2[int(rng.integers(len(DEFAULT_P2)))]
-        yield Case(one.motion, p2, one.vertical if i % 2 else None, polarity)
+        yield Case(recording.motion, p2, recording.vertical if i % 2 else None, polarity)
 
 
 def hard_to_certify(rng: np.random.Generator) -> Iterator[Case]:
     """Yield strong motion on end: made up, and recordings twice as strong, with vertical motion."""
-    known = recordings() if RECORDS_VARIABLE in os.environ else []
-    upward = [each for each in known if each.vertical is not None]
+    records = recordings() if RECORDS_VARIABLE in os.environ else []
+    upward = [record for record in records if record.vertical is not None]
     while True:
         motion, p2 = made_up(rng)
         if upward and rng.integers(3) == 0:
-            one = upward[int(rng.integers(len(upward)))]
-            assert one.vertical is not None
-            motion = scaled(one.motion, 2.0)
-            most = float(np.abs(one.vertical.acceleration_g).max())
-            up = scaled(one.vertical, rng.uniform(0.5, 0.99) / most)
+            recording = upward[int(rng.integers(len(upward)))]
+            assert recording.vertical is not None
+            motion = scaled(recording.motion, 2.0)
+            most = float(np.abs(recording.vertical.acceleration_g).max())
+            up = scaled(recording.vertical, rng.uniform(0.5, 0.99) / most)
             yield Case(motion, DEFAULT_P2[int(rng.integers(len(DEFAULT_P2)))], up)
             continue
         strong = scaled(motion, rng.uniform(1.0, 2.5))
@@ -119,32 +119,33 @@ def contradictions(case: Case, result: CriticalResult, runs: int) -> Iterator[st
         yield f"the block at the upper end {result.upper!r} topples"
     if result.certified:
         above = bottom if upper is None else upper
-        if found := toppling_above(case, excited, above * (1.0 + 1e-12), top, runs):
-            yield f"a block of {found / pga!r} topples above a certified bracket"
+        if contradiction := toppling_above(case, excited, above * (1.0 + 1e-12), top, runs):
+            yield f"a block of {contradiction / pga!r} topples above a certified bracket"
     else:
         assert upper is not None
-        if found := toppling_above(case, excited, bottom * HIDDEN, upper, runs):
-            yield f"a block of {found / pga!r} topples, {found / bottom - 1.0:.2g} above `lower`"
-        if found := toppling_above(case, excited, upper, top, runs // 4):
-            yield f"a block of {found / pga!r} topples above K_up"
+        if contradiction := toppling_above(case, excited, bottom * HIDDEN, upper, runs):
+            above_lower = contradiction / bottom - 1.0
+            yield f"a block of {contradiction / pga!r} topples, {above_lower:.2g} above `lower`"
+        if contradiction := toppling_above(case, excited, upper, top, runs // 4):
+            yield f"a block of {contradiction / pga!r} topples above K_up"
 
 
-def study(what: str, cases: Iterator[Case], runs: int) -> Row:
+def study(subject: str, cases: Iterator[Case], runs: int) -> Row:
     """Judge the answers to some searches."""
-    tried = wrong = certified = others = 0
+    tried = wrong = certified = undecided = 0
     for case in cases:
         result = case.search()
         if result.status in ("no_motion", "outside_model"):
             continue
         tried += 1
         certified += result.certified
-        others += not result.certified
+        undecided += not result.certified
         problems = list(contradictions(case, result, runs))
         wrong += bool(problems)
         for problem in problems:
-            print(f"{what}, {tried} (p2 {case.p2!r}): {problem}", file=sys.stderr, flush=True)
+            print(f"{subject}, {tried} (p2 {case.p2!r}): {problem}", file=sys.stderr, flush=True)
     against = f"Runge-Kutta, {runs:,} runs above each; ends in 32 digits"
-    return Row(what, against, tried, wrong, certified, others)
+    return Row(subject, against, tried, wrong, certified, undecided)
 
 
 def uncertified(number: int, seed: int = SEED) -> tuple[Row, str]:
@@ -152,7 +153,7 @@ def uncertified(number: int, seed: int = SEED) -> tuple[Row, str]:
     rng = np.random.default_rng(seed)
     spent = {True: [0, 0.0], False: [0, 0.0]}
 
-    def some() -> Iterator[Case]:
+    def drawn() -> Iterator[Case]:
         for case in hard_to_certify(rng):
             if spent[False][0] >= number:
                 return
@@ -164,7 +165,7 @@ def uncertified(number: int, seed: int = SEED) -> tuple[Row, str]:
                 if not result.certified:
                     yield case
 
-    row = study("searches without certificate", some(), RUNS_OF_UNCERTIFIED)
+    row = study("searches without certificate", drawn(), RUNS_OF_UNCERTIFIED)
     (yes, yes_s), (no, no_s) = spent[True], spent[False]
     about = (
         f"not certified: {no} of {yes + no}; {1e3 * no_s / no:.0f} ms each, certified ones "
@@ -176,7 +177,7 @@ def uncertified(number: int, seed: int = SEED) -> tuple[Row, str]:
 def rows() -> list[Row]:
     """Return the rows of the table."""
     rng = np.random.default_rng(SEED)
-    found = [
+    table_rows = [
         study("critical values of recordings", of_recordings(rng, OF_RECORDINGS), RUNS_ABOVE),
         study(
             "critical values of made-up records",
@@ -186,4 +187,4 @@ def rows() -> list[Row]:
     ]
     last, about = uncertified(UNCERTIFIED)
     print(about, file=sys.stderr)
-    return [*found, last]
+    return [*table_rows, last]

@@ -45,26 +45,26 @@ def rows() -> list[Row]:
         *islice(lost_contacts(SEED), COUNT // 2),
         *islice(lost_contacts(SEED + 1, of_records(random)), COUNT - COUNT // 2),
     ]
-    return [_row(sort, [each for each in drawn if each.sort == sort]) for sort in SORTS]
+    return [_row(sort, [case for case in drawn if case.sort == sort]) for sort in SORTS]
 
 
 def _row(sort: str, cases: list[LostContact]) -> Row:
-    wrong = within = others = 0
+    wrong = within = undecided = 0
     parts = []
-    for each in cases:
-        error = each.answer.error_estimate
+    for case in cases:
+        error = case.answer.error_estimate
         if error is None:
-            others += 1
+            undecided += 1
             continue
-        springs = each.on_springs()
-        differences = each.differences(springs)
-        parts.append((max(map(abs, differences)) / each.greatest, error / each.greatest))
-        if each.is_covered(springs, error):
+        springs = case.on_springs()
+        differences = case.differences(springs)
+        parts.append((max(map(abs, differences)) / case.greatest, error / case.greatest))
+        if case.is_covered(springs, error):
             within += 1
             continue
         wrong += 1
         print(
-            f"{sort}: {each.greatest:.6f}, of springs {differences} less; error estimate "
+            f"{sort}: {case.greatest:.6f}, of springs {differences} less; error estimate "
             f"{error:.1e}",
             file=sys.stderr,
         )
@@ -75,7 +75,7 @@ def _row(sort: str, cases: list[LostContact]) -> Row:
         file=sys.stderr,
     )
     return Row(f"lost contact: {sort}", "free block on stiff springs", len(cases), wrong, within,
-               others)  # fmt: skip
+               undecided)  # fmt: skip
 
 
 if __name__ == "__main__":

@@ -21,7 +21,7 @@ LEAST_RAD = 1e-9
 def rows() -> list[Row]:
     """Run all cases: wrong is another outcome, or a peak beyond the error estimate."""
     rng = np.random.default_rng(SEED)
-    tried = wrong = within = others = 0
+    tried = wrong = within = undecided = 0
     while tried < RUNS:
         motion, p2 = made_up(rng)
         up = vertical_of(motion, rng, 0.7) if rng.random() < 0.4 else None
@@ -40,11 +40,11 @@ def rows() -> list[Row]:
         if (answer.impacts or 0) > 60:  # what so many impacts make of rounding is no test
             continue
         tried += 1
-        free = parallelogram(alpha1, alpha3, block.r3_m, beta, restitution)
-        true = integrate(excited.time_s, excited.k_h, excited.w, free)
+        mechanism = parallelogram(alpha1, alpha3, block.r3_m, beta, restitution)
+        true = integrate(excited.time_s, excited.k_h, excited.w, mechanism)
         outcome = "toppled" if true.toppled else "stable"
         if answer.sensitive or answer.outcome not in ("stable", "toppled"):
-            others += 1
+            undecided += 1
             continue
         error = 0.0
         if answer.outcome == outcome == "stable":
@@ -62,7 +62,14 @@ def rows() -> list[Row]:
             )
         else:
             within += 1
-    what = "free-standing blocks on both corners"
+    subject = "free-standing blocks on both corners"
     return [
-        Row(what, "DOP853 at 1e-12, restarted at samples and impacts", tried, wrong, within, others)
+        Row(
+            subject,
+            "DOP853 at 1e-12, restarted at samples and impacts",
+            tried,
+            wrong,
+            within,
+            undecided,
+        )
     ]

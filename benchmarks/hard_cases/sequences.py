@@ -136,22 +136,22 @@ def rows() -> list[Row]:
     ]
 
 
-def _row(what: str, against: str, cases: Iterator[Case]) -> Row:
-    wrong = within = others = 0
+def _row(subject: str, against: str, cases: Iterator[Case]) -> Row:
+    wrong = within = undecided = 0
     for number, case in zip(range(OF_EACH), cases, strict=False):
         if case.allowed is None:
-            others += 1
+            undecided += 1
             continue
         if case.same_outcome and case.off <= case.allowed:
             within += 1
             continue
         wrong += 1
         print(
-            f"sequence of {what} {number}: {case.answer.outcome}, off by {case.off:.2e}, allowed "
-            f"{case.allowed:.2e}",
+            f"sequence of {subject} {number}: {case.answer.outcome}, off by {case.off:.2e}, "
+            f"allowed {case.allowed:.2e}",
             file=sys.stderr,
         )
-    return Row(f"sequences of {what}", against, OF_EACH, wrong, within, others)
+    return Row(f"sequences of {subject}", against, OF_EACH, wrong, within, undecided)
 
 
 if __name__ == "__main__":

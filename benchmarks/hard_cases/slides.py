@@ -93,7 +93,7 @@ class Slider:
             if not self.sense:
                 at = self.start(h, at, k_h, w)
                 continue
-            begin, end = (self.pull(self.sense, k, one) for k, one in zip(k_h, w, strict=True))
+            begin, end = (self.pull(self.sense, k, lift) for k, lift in zip(k_h, w, strict=True))
             slope = (end - begin) / h
             a = begin + slope * at
             length = h - at
@@ -117,7 +117,7 @@ class Slider:
         """Time in the interval at which a block at rest starts, or its end."""
         first = h
         for sense in self.strengths:
-            begin, end = (sense * self.pull(sense, k, one) for k, one in zip(k_h, w, strict=True))
+            begin, end = (sense * self.pull(sense, k, lift) for k, lift in zip(k_h, w, strict=True))
             slope = (end - begin) / h
             excess = begin + slope * at
             # at the root of its own standstill rounding must not start it again
@@ -210,7 +210,7 @@ def slides() -> list[Slide]:
 
 def rows() -> list[Row]:
     """Run the cases."""
-    wrong = within = others = 0
+    wrong = within = undecided = 0
     for number, slide in enumerate(slides()):
         answer = respond(
             slide.motion, vertical=slide.vertical, ky=slide.ky, beta_deg=slide.beta_deg,
@@ -218,7 +218,7 @@ def rows() -> list[Row]:
         )  # fmt: skip
         ours = (answer.peak_displacement_m, answer.displacement_m)
         if answer.outcome is not Outcome.STABLE or None in ours or answer.error_estimate is None:
-            others += 1
+            undecided += 1
             print(f"slide {number}: {answer.outcome}", file=sys.stderr)
             continue
         theirs = exact(slide)
@@ -233,7 +233,7 @@ def rows() -> list[Row]:
             file=sys.stderr,
         )
     return [Row("slides, one and both ways", "slider in rational numbers", COUNT, wrong, within,
-                others)]  # fmt: skip
+                undecided)]  # fmt: skip
 
 
 if __name__ == "__main__":

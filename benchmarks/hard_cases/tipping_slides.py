@@ -36,12 +36,12 @@ STIFFER = 24.0
 def rows() -> list[Row]:
     """Run the cases."""
     motions = of_records(np.random.default_rng(SEED))
-    wrong = within = others = 0
+    wrong = within = undecided = 0
     ratios = []
     for case in islice(tipping_slides(SEED, motions), COUNT):
         error = case.answer.error_estimate
         if error is None:
-            others += 1
+            undecided += 1
             continue
         springs = case.on_springs(STIFFER * STIFFNESS)
         ratios.append(case.greatest / max(float(springs.heel_m.max()), 1e-12))
@@ -57,7 +57,7 @@ def rows() -> list[Row]:
     least, median, most = np.quantile(ratios, (0.0, 0.5, 1.0))
     print(f"ratio to springs {least:.2f}, {median:.2f}, {most:.2f}", file=sys.stderr)
     return [Row("slides that tip, recorded motions", "free block on stiff springs", COUNT, wrong,
-                within, others)]  # fmt: skip
+                within, undecided)]  # fmt: skip
 
 
 if __name__ == "__main__":

@@ -93,9 +93,9 @@ def at_the_limits(rng: np.random.Generator) -> Iterator[Case]:
         yield Case(excitation(cut), 10.0, 0.2 * pga)
 
 
-def study(what: str, cases: Iterator[Case], count: int) -> Row:
+def study(subject: str, cases: Iterator[Case], count: int) -> Row:
     """Judge so many runs: wrong is another outcome, or a peak beyond the error estimate."""
-    tried = wrong = within = others = 0
+    tried = wrong = within = undecided = 0
     for case in cases:
         if tried == count:
             break
@@ -104,7 +104,7 @@ def study(what: str, cases: Iterator[Case], count: int) -> Row:
         true = truth(case.excited, p2=case.p2, kr=case.kr)
         mine = OUTCOMES[run.outcome].value
         if mine == "undetermined":
-            others += 1
+            undecided += 1
             continue
         error = 0.0
         if mine == true.outcome == "stable":
@@ -112,13 +112,13 @@ def study(what: str, cases: Iterator[Case], count: int) -> Row:
         if mine != true.outcome or error > run.error_rad:
             wrong += 1
             print(
-                f"{what}: p2 {case.p2!r}, kr {case.kr!r}: {mine}, not {true.outcome}; off by "
+                f"{subject}: p2 {case.p2!r}, kr {case.kr!r}: {mine}, not {true.outcome}; off by "
                 f"{error:.3g}, estimate {run.error_rad:.3g}",
                 file=sys.stderr,
             )
         else:
             within += 1
-    return Row(what, AGAINST, tried, wrong, within, others)
+    return Row(subject, AGAINST, tried, wrong, within, undecided)
 
 
 def rows() -> list[Row]:
@@ -130,6 +130,6 @@ def rows() -> list[Row]:
         "topples at the limits": (at_the_limits, 32),
     }
     return [
-        study(what, cases(np.random.default_rng([SEED, number])), count)
-        for number, (what, (cases, count)) in enumerate(kinds.items())
+        study(subject, cases(np.random.default_rng([SEED, number])), count)
+        for number, (subject, (cases, count)) in enumerate(kinds.items())
     ]

@@ -13,7 +13,7 @@ from pathlib import Path
 
 from benchmarks.certify.recordings import recordings
 from benchmarks.page import report
-from benchmarks.proof import PAGE, brackets, tables
+from benchmarks.proof import PAGE, brackets
 
 
 def main(arguments: Sequence[str] | None = None) -> list[brackets.Row]:
@@ -29,11 +29,11 @@ def main(arguments: Sequence[str] | None = None) -> list[brackets.Row]:
     )
     options.add_argument("--write", action="store_true", help="write the tables into the page")
     chosen = options.parse_args(arguments)
-    known = recordings(chosen.records)
-    found = brackets.study(known, chosen.combinations, chosen.seed, chosen.rows, chosen.seconds)
-    report("proof", tables.by_size(found), write=chosen.write, page=PAGE)
-    report("proof-by-combination", tables.by_combination(found), write=chosen.write, page=PAGE)
-    return found
+    records = recordings(chosen.records)
+    rows = brackets.study(records, chosen.combinations, chosen.seed, chosen.rows, chosen.seconds)
+    report("proof", brackets.by_size(rows), write=chosen.write, page=PAGE)
+    report("proof-by-combination", brackets.by_combination(rows), write=chosen.write, page=PAGE)
+    return rows
 
 
 if __name__ == "__main__":

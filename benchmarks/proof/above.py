@@ -324,11 +324,11 @@ def not_before(place: Place, node: int) -> Place:
     return Place(node, arb(0)) if place.interval < node else place
 
 
-def later(one: Place, other: Place) -> Place:
+def later(first: Place, other: Place) -> Place:
     """The later of two places; a ball that holds both where they overlap."""
-    if one.interval != other.interval:
-        return one if one.interval > other.interval else other
-    return Place(one.interval, one.at.max(other.at))
+    if first.interval != other.interval:
+        return first if first.interval > other.interval else other
+    return Place(first.interval, first.at.max(other.at))
 
 
 def nothing_above(
@@ -392,10 +392,10 @@ def nothing_above(
                 continue
             table_kr = fine.kr if near else coarse.kr
             if low - table_kr > patience * (high - low):
-                known = (len(fine.stretches), fine.failing_end)
+                state = (len(fine.stretches), fine.failing_end)
                 fine = Table(record, max(low - (high - low) / 2, bottom), window)
                 fine.last_rest(window, window, window)
-                gained = known != (len(fine.stretches), fine.failing_end)
+                gained = state != (len(fine.stretches), fine.failing_end)
                 patience = 2 if gained else patience * 8
                 continue
             if high - low <= exact(DEPTH) * high:

@@ -11,10 +11,10 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.certify.recordings import Combination, Recording
+from benchmarks.page import markdown
 from benchmarks.proof.above import nothing_above
-from benchmarks.proof.enclosed_run import STABLE, TOPPLED, Enclosure, enclose
+from benchmarks.proof.enclosed_run import NOT_ENCLOSED, STABLE, TOPPLED, Enclosure, enclose
 from rbfrag.solver.results import DEFAULT_P2, POLARITIES
-from rbfrag.solver.search.critical import critical
 
 DISTANCE = 1e-6
 """Relative distance from the bracket at which blocks are proven to topple and to stay."""
@@ -72,13 +72,13 @@ class Row:
         return not self.above_reason
 
 
-def draw(known: Sequence[Recording], rng: np.random.Generator) -> Iterator[Combination]:
+def draw(records: Sequence[Recording], rng: np.random.Generator) -> Iterator[Combination]:
     """Combinations without end: p² in turn, recording and polarity at random."""
-    upright = [recording for recording in known if recording.vertical is not None]
+    upright = [recording for recording in records if recording.vertical is not None]
     number = 0
     while True:
         up = number % EVERY_VERTICAL == EVERY_VERTICAL - 1
-        among = upright if up else known
+        among = upright if up else records
         yield Combination(
             among[int(rng.integers(len(among)))],
             POLARITIES[int(rng.integers(2))],
@@ -88,31 +88,31 @@ def draw(known: Sequence[Recording], rng: np.random.Generator) -> Iterator[Combi
         number += 1
 
 
-def prove(one: Combination, seconds: float) -> Row | None:
+def prove(combination: Combination, seconds: float) -> Row | None:
     """Search one combination and prove its bracket; None where no block topples or w <= 0.
 
     Args:
-        one: the combination.
+        combination: the combination.
         seconds: processor time after which the proof of all stronger blocks is given up.
     """
-    result = critical(one.recording.motion, p2=one.p2, vertical=one.vertical, polarity=one.polarity)
+    result = combination.search()
     if result.status != "found" or result.lower is None or result.upper is None:
         return None
-    excited = one.excited()
+    excited = combination.excited()
     lower, upper = result.lower * excited.pga_g, result.upper * excited.pga_g
     k_up = (result.k_up_over_pga or np.nan) * excited.pga_g
     started = time.process_time()
     ends: list[Enclosure] = [
-        enclose(excited, p2=one.p2, kr=kr)
+        enclose(excited, p2=combination.p2, kr=kr)
         for kr in (lower * (1.0 - DISTANCE), lower, upper, upper * (1.0 + DISTANCE))
     ]
     took = time.process_time() - started
-    above = nothing_above(excited, p2=one.p2, kr=upper, k_up=k_up, seconds=seconds)
+    above = nothing_above(excited, p2=combination.p2, kr=upper, k_up=k_up, seconds=seconds)
     return Row(
-        motion=one.recording.name,
-        polarity=one.polarity,
-        vertical=one.with_vertical,
-        p2=one.p2,
+        motion=combination.recording.name,
+        polarity=combination.polarity,
+        vertical=combination.with_vertical,
+        p2=combination.p2,
         lower_kr=lower,
         upper_kr=upper,
         k_up=k_up,
@@ -136,40 +136,46 @@ def prove(one: Combination, seconds: float) -> Row | None:
 
 
 def study(
-    known: Sequence[Recording], wanted: int, seed: int, rows: Path, seconds: float
+    records: Sequence[Recording], limit: int, seed: int, rows: Path, seconds: float
 ) -> list[Row]:
     """Prove the brackets of `wanted` combinations; those in the file of rows are not repeated.
 
     Args:
-        known: recordings to draw from.
-        wanted: combinations with a bracket.
+        records: recordings to draw from.
+        limit: combinations with a bracket.
         seed: draws.
         rows: CSV file to which each row is written as it is known.
         seconds: processor time for all stronger blocks of one combination.
     """
     before = {row.key: row for row in read(rows)} if rows.is_file() else {}
-    found: list[Row] = []
+    proven: list[Row] = []
     seen = set()
-    for one in draw(known, np.random.default_rng(seed)):
-        if len(found) >= wanted:
+    for combination in draw(records, np.random.default_rng(seed)):
+        if len(proven) >= limit:
             break
-        key = (one.recording.name, one.polarity, one.with_vertical, one.p2)
+        key = (
+            combination.recording.name,
+            combination.polarity,
+            combination.with_vertical,
+            combination.p2,
+        )
         if key in seen:
             continue
         seen.add(key)
         row = before.get(key)
         if row is None:
-            row = prove(one, seconds)
+            row = prove(combination, seconds)
             if row is None:
                 continue
             write([*before.values(), row], rows)
             before[key] = row
         above = row.above_reason or "nothing above topples"
         print(
-            f"{len(found) + 1:3} {one.name}: {row.topples_at}, {row.stays_at}, {above}", flush=True
+            f"{len(proven) + 1:3} {combination.name}: {row.topples_at}, {row.stays_at}, {above}",
+            flush=True,
         )
-        found.append(row)
-    return found
+        proven.append(row)
+    return proven
 
 
 def write(rows: Sequence[Row], path: Path) -> None:
@@ -188,3 +194,71 @@ def read(path: Path) -> list[Row]:
             Row(**{field.name: as_is[str(field.type)](row[field.name]) for field in fields(Row)})
             for row in csv.DictReader(stream)
         ]
+
+
+def by_size(rows: Sequence[Row]) -> str:
+    """One line for each p²."""
+    head = [
+        "p² [1/s²]", "combinations, with vertical", "lower end topples, upper stays",
+        "at 1e-6 from them", "nothing above topples", "of these, bracket below K_up",
+        "widest enclosure [rad, s]", "seconds: ends, above",
+    ]  # fmt: skip
+    sizes = sorted({row.p2 for row in rows}, reverse=True)
+    cells = [[f"{p2:g}", *_counts([row for row in rows if row.p2 == p2])] for p2 in sizes]
+    return markdown((head, [*cells, ["all", *_counts(rows)]]))
+
+
+BELOW_K_UP = 1e-8
+"""Relative distance from which on a bracket lies below K_up."""
+
+
+def _counts(rows: Sequence[Row]) -> list[str]:
+    below = [row for row in rows if row.k_up > row.upper_kr * (1.0 + BELOW_K_UP)]
+    return [
+        f"{len(rows)}, {sum(row.vertical for row in rows)}",
+        str(sum(row.at_proven for row in rows)),
+        str(sum(row.off_proven for row in rows)),
+        str(sum(row.above_proven for row in rows)),
+        f"{sum(row.above_proven for row in below)} of {len(below)}",
+        f"{max(max(row.topples_width, row.stays_width) for row in rows):.0e}",
+        f"{_median([row.seconds for row in rows])}, {_median([row.above_seconds for row in rows])}",
+    ]
+
+
+def _median(values: Sequence[float]) -> str:
+    return f"{sorted(values)[len(values) // 2]:.1f}"
+
+
+def by_combination(rows: Sequence[Row]) -> str:
+    """One line for each combination, by size."""
+    head = [
+        "record, polarity", "p²", "k_r, lower end", "upper, relative to it",
+        "at −1e-6, decided by", "width", "at +1e-6, decided by", "width", "the ends themselves",
+        "nothing above topples", "intervals", "s",
+    ]  # fmt: skip
+    cells = [
+        [
+            f"{row.motion}, {row.polarity}{', vertical' if row.vertical else ''}",
+            f"{row.p2:g}",
+            f"{row.lower_kr:.9f}",
+            f"+{row.upper_kr / row.lower_kr - 1.0:.1e}",
+            _describe(row.topples_off, row.topples_by),
+            f"{row.topples_width:.0e}",
+            _describe(row.stays_off, row.stays_by),
+            f"{row.stays_width:.0e}",
+            "proven" if row.at_proven else f"{row.topples_at}, {row.stays_at}",
+            row.above_reason or _proven(row.above_undecided),
+            str(row.above_intervals),
+            f"{row.seconds + row.above_seconds:.1f}",
+        ]
+        for row in sorted(rows, key=lambda row: -row.p2)
+    ]
+    return markdown((head, cells))
+
+
+def _describe(outcome: str, why: str) -> str:
+    return f"not: {why}" if outcome == NOT_ENCLOSED else f"{outcome}, {why}"
+
+
+def _proven(undecided: float) -> str:
+    return f"proven but for {undecided:.0e} of k_r" if undecided else "proven"

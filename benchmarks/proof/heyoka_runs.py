@@ -18,7 +18,7 @@ import numpy as np
 from benchmarks.page import find_records, markdown, parser, report
 from benchmarks.proof import PAGE
 from benchmarks.proof.enclosed_run import STABLE, TOPPLED, enclose, least_later_q
-from rbfrag.bench.cases import BenchCase, choose_cases
+from rbfrag.bench.peers import BenchCase, choose_cases
 from rbfrag.solver.excitation import Excitation
 from rbfrag.solver.toppling_run import respond
 
@@ -67,7 +67,7 @@ class Oracle:
         record = excited.time_s.size
         excited = excited.with_rest_after(end_s, 40)
         least = least_later_q(excited)
-        found = Followed()
+        followed = Followed()
         self.turned.clear()
         state: tuple[float, float] | None = None
         lifted = False
@@ -96,22 +96,22 @@ class Oracle:
                 at, state = self._to(self.watched, at, length, state)
                 if state is not None:
                     break
-                found.impacts_s.append(float(excited.time_s[i]) + at)
+                followed.impacts_s.append(float(excited.time_s[i]) + at)
             if state is not None and state[1] > 0.0:
                 phi = math.atan(kr) - state[0]
                 if phi < 0.0 and math.tan(phi) < least[i + 1]:
-                    found.outcome = TOPPLED
-                    return found
+                    followed.outcome = TOPPLED
+                    return followed
             if state is None and i >= record:
                 break
-        found.peak_rad = max(self.turned, default=0.0)
-        return found
+        followed.peak_rad = max(self.turned, default=0.0)
+        return followed
 
     def _excite(self, excited: Excitation, i: int, p2: float, kr: float) -> None:
         length = excited.interval_s[i]
         slopes = [(x[i + 1] - x[i]) / length for x in (excited.k_h, excited.w)]
-        for one in (self.lifting, self.watched):
-            one.pars[:] = [excited.k_h[i], slopes[0], excited.w[i], slopes[1], p2, math.atan(kr)]
+        for system in (self.lifting, self.watched):
+            system.pars[:] = [excited.k_h[i], slopes[0], excited.w[i], slopes[1], p2, math.atan(kr)]
 
     def _to(
         self, integrator: Any, at: float, target: float, state: tuple[float, float]
@@ -176,26 +176,26 @@ def compare(oracle: Oracle, case: BenchCase) -> Difference:
     )
 
 
-def _greatest(one: Sequence[float], other: Sequence[float]) -> float:
-    if len(one) != len(other):
+def _greatest(first: Sequence[float], other: Sequence[float]) -> float:
+    if len(first) != len(other):
         return math.inf
-    return max((abs(a - b) for a, b in zip(one, other, strict=True)), default=math.nan)
+    return max((abs(a - b) for a, b in zip(first, other, strict=True)), default=math.nan)
 
 
-def table(found: Sequence[Difference]) -> str:
+def table(differences: Sequence[Difference]) -> str:
     """One line for each p², as Markdown."""
     rows = []
-    for p2 in sorted({one.case.p2 for one in found}, reverse=True):
-        of_size = [one for one in found if one.case.p2 == p2]
+    for p2 in sorted({difference.case.p2 for difference in differences}, reverse=True):
+        of_size = [difference for difference in differences if difference.case.p2 == p2]
         rows.append(
             [
                 f"{p2:g}",
                 str(len(of_size)),
-                str(sum(len(set(one.outcomes)) == 1 for one in of_size)),
-                str(sum(one.outcomes[0] == STABLE for one in of_size)),
-                str(sum(one.impacts[0] for one in of_size)),
+                str(sum(len(set(difference.outcomes)) == 1 for difference in of_size)),
+                str(sum(difference.outcomes[0] == STABLE for difference in of_size)),
+                str(sum(difference.impacts[0] for difference in of_size)),
                 *(
-                    _largest([getattr(one, name) for one in of_size])
+                    _largest([getattr(difference, name) for difference in of_size])
                     for name in ("peak", "impact_s", "outside_s")
                 ),
             ]
@@ -208,8 +208,8 @@ def table(found: Sequence[Difference]) -> str:
 
 
 def _largest(values: Sequence[float]) -> str:
-    known = np.array(values)[~np.isnan(values)]
-    return f"{known.max():.1e}" if known.size else "–"
+    finite = np.array(values)[~np.isnan(values)]
+    return f"{finite.max():.1e}" if finite.size else "–"
 
 
 def main(arguments: Sequence[str] | None = None) -> list[Difference]:
@@ -219,18 +219,19 @@ def main(arguments: Sequence[str] | None = None) -> list[Difference]:
     chosen = options.parse_args(arguments)
     records = find_records(chosen.records)
     oracle = Oracle()
-    found = []
+    differences = []
     for case in choose_cases(records, chosen.cases, seed=chosen.seed):
-        one = compare(oracle, case)
-        found.append(one)
+        case_error = compare(oracle, case)
+        differences.append(case_error)
         print(
             f"{case.motion.label} {case.polarity} p2={case.p2:g} kr={case.kr:.5g}: "
-            f"{one.outcomes} {one.impacts} {one.peak:.1e} {one.impact_s:.1e} {one.outside_s:.1e}",
+            f"{case_error.outcomes} {case_error.impacts} {case_error.peak:.1e} "
+            f"{case_error.impact_s:.1e} {case_error.outside_s:.1e}",
             flush=True,
         )
-    about = f"{len(found)} runs under {records.source}, seed {chosen.seed}."
-    report("heyoka", f"{table(found)}\n\n{about}", write=chosen.write, page=PAGE)
-    return found
+    about = f"{len(differences)} runs under {records.source}, seed {chosen.seed}."
+    report("heyoka", f"{table(differences)}\n\n{about}", write=chosen.write, page=PAGE)
+    return differences
 
 
 if __name__ == "__main__":

@@ -7,23 +7,25 @@ from collections import defaultdict
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field, fields, replace
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from sqlalchemy import Connection, Engine
 
-from rbfrag.campaign.record_metadata import Trace, missing_files, read_traces
 from rbfrag.db.engine import opened_database
 from rbfrag.db.motions import add_motion, motion_row, same_source
 from rbfrag.db.rows import EarthquakeInfo
 from rbfrag.db.vertical_pairs import recordings_of_mixed_dt
 from rbfrag.errors import InputError, MotionFileError, checked_name
-from rbfrag.motions.archive import archive_of, is_archive, members_of, records_among
-from rbfrag.motions.direction import upward
+from rbfrag.motions.archive import archive_of, is_archive, is_there, members_of, records_among
+from rbfrag.motions.direction import azimuth_deg, is_vertical_name, upward
 from rbfrag.motions.formats.delimited_text import INDEX
-from rbfrag.motions.metadata import read_metadata
+from rbfrag.motions.ground_motion import GroundMotion
+from rbfrag.motions.header_check import doubts
+from rbfrag.motions.metadata import MotionMetadata, TraceMetadata, read_metadata
 from rbfrag.motions.processing import (
     DEFAULT_HIGH_PASS,
     HighPass,
@@ -32,9 +34,11 @@ from rbfrag.motions.processing import (
     says_corrected,
 )
 from rbfrag.motions.quality import DIRECTION_GUESSED, STRUCTURE, is_on_structure, quality_flags
-from rbfrag.motions.text.header_check import doubts
+from rbfrag.motions.readers import read_motions
+from rbfrag.motions.units import acceleration_unit, stated_in_g, unit_in_g
 from rbfrag.results.diagnostic import Diagnostic
 from rbfrag.results.result import Result, TextLine
+from rbfrag.threads import with_one_thread
 
 AS_SUPPLIED = "as supplied"
 
@@ -71,7 +75,8 @@ class AddReport(Result):
             stored with two kinds of processing, a recording with several sampling intervals, a
             header that disagrees with its samples, a direction that is guessed, a sensor on a
             structure.
-        not_read: columns of the metadata that nothing is read from.
+        not_read: columns of the metadata that are ignored, because the components of a recording
+            differ in them.
     """
 
     added: tuple[int, ...]
@@ -94,7 +99,8 @@ class AddReport(Result):
     def lines(self) -> Iterator[TextLine]:
         """Yield the ignored columns of the metadata."""
         if self.not_read:
-            yield TextLine("Ignored", f"columns of the metadata: {', '.join(self.not_read)}")
+            names = ", ".join(self.not_read)
+            yield TextLine("Ignored", f"columns that differ between components: {names}")
 
     def table_columns(self) -> dict[str, NDArray[Any]]:
         """Return id and state of every motion, and the file and reason of each that failed."""
@@ -133,8 +139,7 @@ class _Additions:
     doubts: defaultdict[str, list[str]] = field(default_factory=lambda: defaultdict(list))
 
 
-@dataclass(frozen=True)
-class _Stored:
+class _Stored(NamedTuple):
     """One stored trace."""
 
     motion_id: int
@@ -144,6 +149,7 @@ class _Stored:
     doubt: str
 
 
+@with_one_thread
 def add_motions(
     paths: str | os.PathLike[str] | Sequence[str | os.PathLike[str]],
     *,
@@ -156,6 +162,7 @@ def add_motions(
     raw: bool = False,
     allow_partial: bool = False,
     gain: float | None = None,
+    channel: str | None = None,
     high_pass: HighPass = DEFAULT_HIGH_PASS,
     on_file: Callable[[int, int], None] | None = None,
 ) -> AddReport:
@@ -168,7 +175,7 @@ def add_motions(
     Args:
         paths: a file, member of a zip (``records.zip/chan001.v2``), zip or folder, or several;
             folders are searched with all folders and zips below them. Passed over are texts about
-            the records (archive.DOCUMENTS) and spectra (V3) beside their record (V2).
+            the records (archive.DOCUMENTS) and spectra (V3) next to their record (V2).
         db: the database (path, URL, or None for the default).
         suite: suite to put the motions into.
         metadata: CSV that states, by file and trace, earthquake, units and direction.
@@ -183,6 +190,8 @@ def add_motions(
         allow_partial: read files whose header states another number of samples than follow;
             their motions are flagged `partial`.
         gain: counts/(m/s²) of files in counts (miniSEED) of which the metadata state none.
+        channel: channels of miniSEED files to read, as for :func:`rbfrag.read_motions`; other
+            files are rejected.
         high_pass: what is applied to uncorrected records.
         on_file: called after each file with (files done, files in all).
 
@@ -217,7 +226,7 @@ def add_motions(
         engine: Engine | None = None
         for number, file in enumerate(files, 1):
             try:
-                traces = read_traces(file, table, units, dt_s, allow_partial, gain)
+                traces = read_traces(file, table, units, dt_s, allow_partial, gain, channel)
                 _take_note_of_units(run, file, traces, units, alone=len(files) == 1)
                 if gain is not None and len(files) == 1 and not traces[0].by_gain:
                     raise MotionFileError(
@@ -229,44 +238,49 @@ def add_motions(
                     engine = stack.enter_context(opened_database(db, create=True))
                 with engine.begin() as connection:
                     stored = [_store(connection, file, trace, run) for trace in traces]
+            except MotionFileError as error:
+                line = "" if error.line is None else f"line {error.line}: "
+                run.failed.append(FailedFile(str(file), line + error.reason))
             except InputError as error:
-                run.failed.append(FailedFile(str(file), _reason(error)))
+                run.failed.append(FailedFile(str(file), str(error)))
             else:
-                _take_note(run, stored)
-                _take_note_of_sensors(run, file, traces)
-                remarks = [remark for trace in traces for remark in trace.motion.remarks]
-                run.warnings += (
-                    Diagnostic(f"{file}: {text}", "header_check")
-                    for text in dict.fromkeys(doubts(remarks))
-                )
+                _take_note(run, file, traces, stored)
             if on_file is not None:
                 on_file(number, len(files))
         if engine is not None:
             with engine.connect() as connection:
-                run.warnings += _mixed_intervals(connection, run.place)
+                mixed_recordings = recordings_of_mixed_dt(connection)
+            for name, intervals, motion_ids in mixed_recordings:
+                if not run.place.keys().isdisjoint(motion_ids):
+                    text = (
+                        f"recording {name!r} has components of dt = "
+                        f"{' and '.join(f'{dt:g}' for dt in intervals)} s: those that differ are "
+                        "not used together"
+                    )
+                    run.warnings.append(Diagnostic(text, "components_differ"))
     for code, names in run.doubts.items():
         listed = f"{', '.join(names[:5])}{', …' if len(names) > 5 else ''}"
         run.warnings.append(Diagnostic(f"{len(names)} traces {DOUBTS[code]}: {listed}", code))
     return AddReport(*(tuple(getattr(run, item.name)) for item in fields(AddReport)))
 
 
-def _take_note(run: _Additions, stored: list[_Stored]) -> None:
-    for trace in stored:
-        (run.added if trace.new else run.already_stored).append(trace.motion_id)
-        if trace.new and trace.processed:
-            run.processed.append(trace.motion_id)
-        first = run.place.setdefault(trace.motion_id, trace.place)
-        if first != trace.place:
+def _take_note(
+    run: _Additions, file: Path, traces: list[Trace], stored_traces: list[_Stored]
+) -> None:
+    """Count the stored traces of a file, and collect warnings about them."""
+    for stored in stored_traces:
+        (run.added if stored.new else run.already_stored).append(stored.motion_id)
+        if stored.new and stored.processed:
+            run.processed.append(stored.motion_id)
+        first = run.place.setdefault(stored.motion_id, stored.place)
+        if first != stored.place:
             text = (
-                f"{trace.place} holds the same samples as {first}: stored once, as motion "
-                f"{trace.motion_id}"
+                f"{stored.place} holds the same samples as {first}: stored once, as motion "
+                f"{stored.motion_id}"
             )
             run.warnings.append(Diagnostic(text, "duplicate_record"))
-        elif trace.doubt:
-            run.warnings.append(Diagnostic(trace.doubt, "duplicate_record"))
-
-
-def _take_note_of_sensors(run: _Additions, file: Path, traces: list[Trace]) -> None:
+        elif stored.doubt:
+            run.warnings.append(Diagnostic(stored.doubt, "duplicate_record"))
     for trace in traces:
         motion = trace.motion
         name = f"{file.name}#{motion.trace_index} {motion.component}".rstrip()
@@ -277,6 +291,10 @@ def _take_note_of_sensors(run: _Additions, file: Path, traces: list[Trace]) -> N
             run.doubts[DIRECTION_GUESSED].append(name)
         if is_on_structure(motion):
             run.doubts[STRUCTURE].append(f"{name} at {motion.location}")
+    remarks = [remark for trace in traces for remark in trace.motion.remarks]
+    run.warnings += (
+        Diagnostic(f"{file}: {text}", "header_check") for text in dict.fromkeys(doubts(remarks))
+    )
 
 
 def _take_note_of_units(
@@ -295,19 +313,6 @@ def _take_note_of_units(
         run.warnings.append(Diagnostic(text, "unit_in_file"))
 
 
-def _mixed_intervals(connection: Connection, touched: dict[int, str]) -> list[Diagnostic]:
-    return [
-        Diagnostic(
-            f"recording {mixed.name!r} has components of dt = "
-            f"{' and '.join(f'{dt:g}' for dt in mixed.dt_s)} s: those that differ are not used "
-            "together",
-            "components_differ",
-        )
-        for mixed in recordings_of_mixed_dt(connection)
-        if not touched.keys().isdisjoint(mixed.motion_ids)
-    ]
-
-
 def _files(
     paths: Sequence[str | os.PathLike[str]], leave_out: str | os.PathLike[str] | None
 ) -> Iterator[Path]:
@@ -322,23 +327,22 @@ def _files(
         else:
             raise InputError(f"file or folder not found: {path}")
         for file in below:
-            for record in _records(file) if file.resolve() != skipped else ():
-                any_file = True
-                yield record
+            if file.resolve() == skipped:
+                continue
+            try:
+                records = members_of(file) if is_archive(file) else [file]
+            except MotionFileError:
+                records = [file]  # rejected with the reason when it is read
+            any_file = any_file or bool(records)
+            yield from records
     if not any_file:
         raise InputError(f"no files in {', '.join(map(str, paths))}")
 
 
-def _records(file: Path) -> list[Path]:
-    try:
-        return members_of(file) if is_archive(file) else [file]
-    except MotionFileError:
-        # rejected with the reason when it is read
-        return [file]
-
-
 def _store(connection: Connection, file: Path, trace: Trace, run: _Additions) -> _Stored:
     motion, metadata = trace.motion, trace.metadata
+    if motion.orientation_deg is None and metadata.component:
+        motion = replace(motion, orientation_deg=azimuth_deg(metadata.component))
     flags: list[str] = []
     uncorrected = counts_as_uncorrected(motion, metadata.processing, run.processing)
     filtered = uncorrected and run.high_pass is not None
@@ -359,6 +363,8 @@ def _store(connection: Connection, file: Path, trace: Trace, run: _Additions) ->
             magnitude=metadata.magnitude,
             time=metadata.year,
             guessed=False,
+            mechanism=metadata.mechanism,
+            depth_km=metadata.depth_km,
         )
     else:
         earthquake = EarthquakeInfo(event_id=motion.event, name=motion.event)
@@ -381,6 +387,7 @@ def _store(connection: Connection, file: Path, trace: Trace, run: _Additions) ->
         processing=words,
         flags=flags,
         suite=run.suite,
+        site={**metadata.site, "attributes": metadata.attributes},
     )
     name = f"{file}#{motion.trace_index}"
     if not new and motion_id not in run.place:
@@ -399,7 +406,168 @@ def _store(connection: Connection, file: Path, trace: Trace, run: _Additions) ->
     return _Stored(motion_id, new, filtered, name, doubt)
 
 
-def _reason(error: InputError) -> str:
-    if isinstance(error, MotionFileError):
-        return error.reason if error.line is None else f"line {error.line}: {error.reason}"
-    return str(error)
+NOTHING_STATED = TraceMetadata(file="", line=0)
+
+
+@dataclass(frozen=True)
+class Trace:
+    """One trace of a file with its metadata, empty where not given.
+
+    `other_unit` is what file or metadata state where the caller stated another unit; else empty.
+    `by_gain`: it was in counts, and read by the gain that the caller stated.
+    """
+
+    motion: GroundMotion
+    metadata: TraceMetadata
+    other_unit: str = ""
+    by_gain: bool = False
+
+    @property
+    def is_vertical(self) -> bool | None:
+        """True if the component is vertical; None if neither file nor metadata give it.
+
+        Metadata take precedence: what they state, then the name that they give the component.
+        """
+        vertical, named = self.metadata.is_vertical, is_vertical_name(self.metadata.component)
+        by_metadata = named if vertical is None else vertical
+        return self.motion.is_vertical if by_metadata is None else by_metadata
+
+    @property
+    def other_direction(self) -> str:
+        """Warning that metadata and file disagree on the direction; empty if they agree."""
+        if self.motion.is_vertical in (None, self.is_vertical):
+            return ""
+        return (
+            f"line {self.metadata.line} of the metadata says "
+            f"{'vertical' if self.is_vertical else 'horizontal'} of trace "
+            f"{self.motion.trace_index} ({self.motion.component}), which the file's own header "
+            "does not"
+        )
+
+
+def read_traces(
+    file: Path,
+    metadata: MotionMetadata | None,
+    units: str | None,
+    dt_s: float | None,
+    allow_partial: bool = False,
+    gain: float | None = None,
+    channel: str | None = None,
+) -> list[Trace]:
+    """Return every trace of a file with its row of the metadata.
+
+    Args:
+        metadata: the table, or None.
+        units: unit that the caller states for files that state none, neither by themselves nor
+            by the table, or whose samples contradict it; :attr:`Trace.other_unit` names one that
+            does state another.
+        dt_s: sampling interval that the caller states [s]; likewise.
+        allow_partial: as for :func:`rbfrag.motions.readers.read_motions`.
+        gain: counts/(m/s²) of files in counts of which the table states none.
+        channel: as for :func:`rbfrag.motions.readers.read_motions`.
+
+    Raises:
+        MotionFileError: the file cannot be read, or the metadata contradict it or themselves.
+    """
+    rows = [] if metadata is None else metadata.file(file)
+    if rows:
+        _reject_rows_apart(file, rows)
+        dt_s = dt_s or rows[0].dt_s
+    by_table = _known_unit(rows[0].units) if rows else None
+    read = partial(read_motions, file, dt_s=dt_s, allow_partial=allow_partial, channel=channel)
+    gains = {row.trace_index: row.gain for row in rows if row.gain is not None}
+    file_gain = gains.get(None)
+    by_index = {index: value for index, value in gains.items() if index is not None}
+    by_gain = False
+    try:
+        motions = read(
+            units=by_table, gain=file_gain if file_gain is not None else by_index or None
+        )
+    except MotionFileError as error:
+        # stated by neither, or contradicted by the samples
+        if units is not None and by_table is None and "units" in error.fields:
+            motions = read(units=units)
+        elif by_gain := gain is not None and not gains and "gain" in error.fields:
+            motions = read(gain=gain)
+        else:
+            raise
+    rows_by_index = _rows_of_traces(file, rows, motions)
+    for index, row in rows_by_index.items():
+        if index >= len(motions):
+            raise MotionFileError(
+                file,
+                f"line {row.line} of the metadata has trace_index {index}, but the file has "
+                f"{len(motions)} traces, counted from 0: correct trace_index",
+            )
+    traces = []
+    for motion in motions:
+        unit = motion.stated_unit or by_table or ""
+        agrees = units is None or not unit or stated_in_g(unit) == unit_in_g(units)
+        row = rows_by_index.get(motion.trace_index, NOTHING_STATED)
+        trace = Trace(motion, row, "" if agrees else unit, by_gain)
+        traces.append(trace)
+        if trace.metadata.trace_index is None and len(motions) > 1 and trace.other_direction:
+            # a row about a whole file says nothing about the direction of one of its traces
+            raise MotionFileError(file, f"{trace.other_direction}: give each trace a row")
+    return traces
+
+
+def missing_files(
+    metadata: MotionMetadata, paths: list[Path]
+) -> Iterator[tuple[str, TraceMetadata]]:
+    """Yield the files named in the metadata that are missing below the given paths.
+
+    Args:
+        paths: files and folders that are being read; rows that point elsewhere are passed over.
+    """
+    folder = Path(metadata.path).absolute().parent
+    roots = [path.absolute().resolve() for path in paths]
+    seen: set[Path] = set()
+    for row in metadata.rows:
+        named = folder / row.file
+        place = named.resolve()
+        if place in seen or is_there(place):
+            continue
+        seen.add(place)
+        if any(place == searched or searched in place.parents for searched in roots):
+            yield str(named), row
+
+
+def _rows_of_traces(
+    file: Path, rows: list[TraceMetadata], motions: list[GroundMotion]
+) -> dict[int, TraceMetadata]:
+    """Rows by trace index; a row without an index applies to every trace of the file."""
+    file_row = next((row for row in rows if row.trace_index is None), None)
+    if file_row is None:
+        return {row.trace_index: row for row in rows if row.trace_index is not None}
+    if len(motions) > 1 and file_row.component:
+        raise MotionFileError(
+            file,
+            f"line {file_row.line} of the metadata calls all {len(motions)} traces of the file "
+            f"{file_row.component}: give each a row with its trace_index, from 0",
+        )
+    return dict.fromkeys(range(len(motions)), file_row)
+
+
+def _reject_rows_apart(file: Path, rows: list[TraceMetadata]) -> None:
+    """Reject metadata with different units for the traces of one file."""
+    for name in ("units", "dt_s"):
+        values = {getattr(row, name) for row in rows} - {None}
+        if len(values) > 1:
+            lines = ", ".join(str(row.line) for row in rows)
+            shown = " and ".join(sorted(map(str, values)))
+            raise MotionFileError(
+                file,
+                f"lines {lines} of the metadata state {name} {shown} for this one file: correct "
+                "the metadata",
+            )
+
+
+def _known_unit(text: str | None) -> str | None:
+    """Return the unit in the metadata, unless its format converts it (counts, g/10)."""
+    if text is None:
+        return None
+    try:
+        return acceleration_unit(text)
+    except InputError:
+        return None

@@ -1,25 +1,32 @@
-"""Plan of a campaign: its combinations, and the remaining work."""
+"""Plan of a campaign: its motions and combinations, and the remaining work."""
 
 from __future__ import annotations
 
-from collections.abc import Container, Iterable, Mapping, Sequence
+from collections.abc import Container, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import TypedDict
 
 import numpy as np
 from sqlalchemy import Connection
 
-from rbfrag.campaign.horizontal_motions import horizontal_motions
 from rbfrag.campaign.kind import Case
 from rbfrag.campaign.kinds import campaign_of_kind
 from rbfrag.campaign.worker import PlannedCase, Task
-from rbfrag.db.campaigns import KnownCombination, combinations_with_points, known_combinations
+from rbfrag.db.campaigns import (
+    KnownCombination,
+    SpectrumKey,
+    combinations_with_points,
+    known_combinations,
+    known_keys,
+    spectrum_values,
+)
 from rbfrag.db.keys import combination_key
-from rbfrag.db.responses import known_responses
+from rbfrag.db.motions import motion_rows
 from rbfrag.db.rows import MotionRow, Vertical
-from rbfrag.db.spectra import SpectrumKey, spectrum_values
 from rbfrag.db.vertical_pairs import VerticalPair, vertical_pairs
 from rbfrag.errors import InputError
+from rbfrag.motions.quality import DIRECTION_GUESSED, STRUCTURE
 from rbfrag.results.diagnostic import Diagnostic
 from rbfrag.solver.kinds import facts_of
 from rbfrag.solver.quantity import positive
@@ -82,36 +89,9 @@ class CampaignPlan:
         return [case for plan in self.motions for case in plan.cases]
 
 
-@dataclass(frozen=True)
-class MotionTasks:
-    """Remaining work on one horizontal motion.
-
-    Args:
-        tasks: what its combinations lack.
-        spectrum: p² [1/s²] at which its toppling spectrum is missing, by polarity.
-    """
-
-    plan: MotionPlan
-    tasks: tuple[Task, ...]
-    spectrum: dict[Polarity, tuple[float, ...]]
-
-
-@dataclass(frozen=True)
-class Todo:
-    """Remaining work of a campaign.
-
-    Args:
-        motions: those with something left to do, in the order of the plan.
-        combinations: what is stored of each combination, by natural key.
-    """
-
-    motions: tuple[MotionTasks, ...]
-    combinations: dict[str, KnownCombination]
-
-    @property
-    def tasks(self) -> int:
-        """Number of combinations with remaining work."""
-        return sum(len(motion.tasks) for motion in self.motions)
+MotionTasks = tuple[int, tuple[Task, ...], dict[Polarity, tuple[float, ...]]]
+"""Remaining work on one horizontal motion: its id, the tasks of its combinations, and the p² [1/s²]
+at which its toppling spectrum is missing, by polarity."""
 
 
 def plan_campaign(
@@ -122,6 +102,7 @@ def plan_campaign(
     suite: str | None,
     vertical: Vertical = "without",
     include_structures: bool = False,
+    where: str | None = None,
 ) -> CampaignPlan:
     """Return every combination: horizontal motions x with or without vertical x polarity x cases.
 
@@ -130,6 +111,7 @@ def plan_campaign(
         suite: only the horizontal motions of this suite; their verticals need not be in it.
         vertical: ``without`` vertical motion, ``with`` that of the same recording, or ``both``.
         include_structures: use motions of sensors on structures, too.
+        where: only horizontal motions that meet this condition.
 
     Raises:
         InputError: no such suite, no horizontal motion, none with a vertical one where it is
@@ -140,7 +122,7 @@ def plan_campaign(
             f"vertical must be without, with or both, not {vertical!r}", fields=("vertical",)
         )
     rows, warnings = horizontal_motions(
-        connection, suite=suite, include_structures=include_structures
+        connection, suite=suite, include_structures=include_structures, where=where
     )
     companions = {} if vertical == "without" else vertical_pairs(connection, suite=suite)
     pairs = [companions[row.id] for row in rows if row.id in companions]
@@ -158,58 +140,62 @@ def plan_campaign(
             f"are {treatment}: {_first(lacking)}"
         )
         warnings.append(Diagnostic(text, "no_vertical"))
-    plans = [
-        MotionPlan(
-            motion=row,
-            vertical=fitting.get(row.id),
-            cases=tuple(
-                _planned(row, up, polarity, case)
-                for up in _verticals(vertical, fitting.get(row.id))
-                for polarity in campaign_of_kind(kind).polarities
-                for case in cases
-            ),
+    plans = []
+    for row in rows:
+        companion = fitting.get(row.id)
+        verticals: list[VerticalPair | None] = [] if vertical == "with" else [None]
+        verticals += [] if companion is None else [companion]
+        planned = tuple(
+            _planned(row, up, polarity, case)
+            for up in verticals
+            for polarity in campaign_of_kind(kind).polarities
+            for case in cases
         )
-        for row in rows
-    ]
+        plans.append(MotionPlan(row, companion, planned))
     ordered = sorted((p for p in plans if p.cases), key=lambda p: (-p.motion.npts, p.motion.id))
     return CampaignPlan(kind, tuple(ordered), len(lacking), tuple(warnings))
 
 
-def remaining_work(connection: Connection, plan: CampaignPlan, extra: ExtraResults) -> Todo:
-    """Return the part of a plan that is not stored yet.
+def remaining_work(
+    connection: Connection, plan: CampaignPlan, extra: ExtraResults
+) -> tuple[list[MotionTasks], dict[str, KnownCombination]]:
+    """Return the part of a plan that is not stored yet, and the state of stored combinations.
 
     Args:
-        extra: what it asks for in addition to critical values and outcome grids.
+        extra: results requested in addition to critical values and outcome grids.
+
+    Returns:
+        The motions with remaining work, in the order of the plan; stored combinations by natural
+        key.
     """
     combinations = known_combinations(connection, (case.natural_key for case in plan.cases))
     with_blocks = (
         combinations_with_points(connection, combinations, extra.blocks) if extra.blocks else set()
     )
-    histories = known_responses(
-        connection,
-        (
-            _history_key(motion, case, ratio)
-            for motion in plan.motions
-            for case in motion.cases
-            for ratio in _histories(combinations.get(case.natural_key), extra)
-        ),
-    )
+    keys = []
+    for motion in plan.motions:
+        for case in motion.cases:
+            there = combinations.get(case.natural_key)
+            critical = None if there is None else there.kr_over_pga
+            of_critical = [critical] if extra.critical_history and critical is not None else []
+            keys += [_history_key(motion, case, k) for k in (*extra.histories, *of_critical)]
+    histories = known_keys(connection, keys, "response")
     # X(p) is a measure of blocks that are described by p² and backed by a slope
     facts = facts_of(plan.kind)
     described = "p2" in facts.parameters and not facts.free_standing
     sizes = list(dict.fromkeys(c.case.p2 for c in plan.cases if c.case.p2 and described))
     spectra = spectrum_values(connection, p2=sizes) if sizes else {}
-    motions = []
+    work: list[MotionTasks] = []
     for motion in plan.motions:
         tasks = [
             _task(motion, case, combinations, with_blocks, histories, extra)
             for case in motion.cases
         ]
-        remaining = tuple(task for task in tasks if task is not None)
+        remaining = tuple(task for task in tasks if task.asks)
         spectrum = missing_sizes(spectra, motion.motion.id, sizes)
         if remaining or spectrum:
-            motions.append(MotionTasks(motion, remaining, spectrum))
-    return Todo(tuple(motions), combinations)
+            work.append((motion.motion.id, remaining, spectrum))
+    return work, combinations
 
 
 def missing_sizes(
@@ -258,14 +244,6 @@ def checked_ratios(values: Sequence[float], name: str) -> tuple[float, ...]:
     return tuple(ratios)
 
 
-def _verticals(vertical: Vertical, companion: VerticalPair | None) -> Iterable[VerticalPair | None]:
-    """Yield the vertical motions to combine with a horizontal one, None for without."""
-    if vertical != "with":
-        yield None
-    if vertical != "without" and companion is not None:
-        yield companion
-
-
 def _planned(
     row: MotionRow, up: VerticalPair | None, polarity: Polarity, case: Case
 ) -> PlannedCase:
@@ -290,7 +268,7 @@ def _task(
     with_blocks: set[str],
     histories: set[str],
     extra: ExtraResults,
-) -> Task | None:
+) -> Task:
     there = combinations.get(planned.natural_key)
     moves = motion.motion.pga_g > 0.0  # without motion k/PGA says nothing
     critical = None if there is None else there.kr_over_pga
@@ -299,7 +277,7 @@ def _task(
         and there.status != "outside_model"
         and len(campaign_of_kind(planned.case.kind).grid(planned.case, motion.motion)) > 0
     )
-    task = Task(
+    return Task(
         planned=planned,
         search=there is None,
         grid=moves and lacks_grid,
@@ -318,13 +296,6 @@ def _task(
         ),
         critical_k_over_pga=critical,
     )
-    return task if task.asks else None
-
-
-def _histories(there: KnownCombination | None, extra: ExtraResults) -> Iterable[float]:
-    yield from extra.histories
-    if extra.critical_history and there is not None and there.kr_over_pga is not None:
-        yield there.kr_over_pga
 
 
 def _history_key(motion: MotionPlan, planned: PlannedCase, k_over_pga: float) -> str:
@@ -338,3 +309,63 @@ def _first(reasons: Sequence[str], at_most: int = 3) -> str:
     different = list(dict.fromkeys(reasons))
     more = f"; and {len(different) - at_most} more" if len(different) > at_most else ""
     return "; ".join(different[:at_most]) + more
+
+
+class MotionChoice(TypedDict):
+    """Selection of the motions of a campaign."""
+
+    suite: str | None
+    include_structures: bool
+    where: str | None
+
+
+def horizontal_motions(
+    connection: Connection,
+    *,
+    suite: str | None = None,
+    include_structures: bool = False,
+    where: str | None = None,
+) -> tuple[list[MotionRow], list[str]]:
+    """Return the horizontal motions of a campaign by id, and warnings about their sensors.
+
+    Args:
+        suite: only the motions of this suite.
+        include_structures: use motions of sensors on structures, too.
+        where: only motions that meet this condition.
+
+    Raises:
+        InputError: no such suite, no horizontal motion, or a condition that is not supported.
+    """
+    rows_of_suite = motion_rows(connection, suite=suite, where=where)
+    every = [row for row in rows_of_suite if not row.is_vertical]
+    place = "the database" if suite is None else f"suite {suite!r}"
+    if not every and where is not None:
+        raise InputError(
+            f"where: no horizontal motion in {place} meets {where}: change the condition",
+            fields=("where",),
+        )
+    if not every:
+        raise InputError(
+            f"no horizontal motions in {place}: add some with  rbfrag motions add PATH"
+        )
+    rows = [row for row in every if include_structures or STRUCTURE not in row.flags]
+    if not rows:
+        raise InputError(
+            f"all {len(every)} horizontal motions in {place} were recorded on structures: add "
+            "others, or set include_structures",
+            fields=("include_structures",),
+        )
+    warnings: list[str] = []
+    if len(rows) < len(every):
+        text = (
+            f"{len(every) - len(rows)} of {len(every)} horizontal motions were recorded on "
+            "structures and are excluded: they are not ground motion"
+        )
+        warnings.append(Diagnostic(text, "structure"))
+    if guessed := sum(DIRECTION_GUESSED in row.flags for row in rows):
+        text = (
+            f"the direction of {guessed} of {len(rows)} motions is guessed: a vertical one among "
+            "them is simulated as a horizontal; give is_vertical in a table of metadata"
+        )
+        warnings.append(Diagnostic(text, "direction_guessed"))
+    return rows, warnings

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import math
+import os
+import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from os import PathLike
@@ -10,26 +13,42 @@ from typing import Any, Unpack
 import numpy as np
 from numpy.typing import NDArray
 
-from rbfrag.campaign.shake_rockmass import shake
+from rbfrag.campaign.executors import run_locally
 from rbfrag.campaign.summary import CampaignProgress
 from rbfrag.errors import InputError, UnknownFieldError
 from rbfrag.files import as_path
 from rbfrag.fragility.confidence import checked_level
 from rbfrag.fragility.measures import spectral
 from rbfrag.fragility.model import Model
+from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.polarity import Polarity
 from rbfrag.motions.readers import MotionLike, as_motion
 from rbfrag.question.fields import MeasureFields
 from rbfrag.results.diagnostic import codes_by_row
 from rbfrag.results.numbers import interval, percent, rounded, with_interval
 from rbfrag.results.result import Result, TextLine, TextTable
-from rbfrag.rockmasses.counts import crossings, mode_counts
-from rbfrag.rockmasses.failures import failure_warnings, failures, failures_as_dict, outcome_columns
+from rbfrag.rockmasses.counts import crossings, failures, mode_counts
 from rbfrag.rockmasses.file import read_rock_mass, rock_mass_of_tables
 from rbfrag.rockmasses.joint_sets import Realisations, RockMass
-from rbfrag.rockmasses.report import as_dict, block_columns, mass_warnings
+from rbfrag.rockmasses.report import (
+    as_dict,
+    block_columns,
+    failure_warnings,
+    failures_as_dict,
+    mass_warnings,
+    outcome_columns,
+)
 from rbfrag.rockmasses.scenario import Scenario, scenario
-from rbfrag.rockmasses.shaking import OUTCOMES, FailureLimits, ShakenMass
+from rbfrag.rockmasses.shaking import (
+    CHUNK,
+    OUTCOMES,
+    BlockOutcomes,
+    FailureLimits,
+    ShakenMass,
+    ShakingOptions,
+    plan_shaking,
+    run_blocks,
+)
 from rbfrag.solver.stability.modes import words_of_mode
 from rbfrag.vocabulary.quantities import INTENSITY, QUANTITIES
 
@@ -79,7 +98,11 @@ class RockMassAnswer(Result):
                 yield f"Drained: {_of_average(drained)}"
         shaking = document["shaking"]
         for scale in () if shaking is None else shaking["scales"]:
-            yield _of_scale(shaking["motion"], scale)
+            of_all, unknown = scale["all"]["fails_of_all"], scale["all"]["open_of_all"]
+            share = with_interval(of_all["share"], of_all["ci_low"], of_all["ci_high"])
+            undetermined = f"; {percent(unknown)} undetermined" if unknown else ""
+            scaled = f"{shaking['motion']} × {scale['scale']:g}"
+            yield f"{scaled}: {share} of the blocks fail{undetermined}"
 
     def lines(self) -> Iterator[TextLine]:
         """Yield rejected realisations, equal counts, intensity measures and model, and failure
@@ -117,17 +140,10 @@ class RockMassAnswer(Result):
                 "Motion",
                 f"{shaking['motion']}, {shaking['polarity']} polarity: {shaking['runs']:,} runs",
             )
-            yield TextLine("Limits", self._limits(shaking))
-
-    @staticmethod
-    def _limits(shaking: Mapping[str, Any]) -> str:
-        """Return the limits beyond which blocks fail."""
-        limit_deg = shaking["rotation_limit_deg"]
-        rotation = (
-            "past recovery" if limit_deg is None else f"beyond {limit_deg:g}° or past recovery"
-        )
-        limit_m = shaking["displacement_limit_m"]
-        return f"a slide fails beyond {limit_m:g} m, a rotating block {rotation}"
+            limit_m, limit_deg = shaking["displacement_limit_m"], shaking["rotation_limit_deg"]
+            beyond = "" if limit_deg is None else f"beyond {limit_deg:g}° or "
+            text = f"a slide fails beyond {limit_m:g} m, a rotating block {beyond}past recovery"
+            yield TextLine("Limits", text)
 
     def tables(self, *, verbose: bool = False) -> Iterator[TextTable]:
         """Yield the modes, the probabilities by mode, and failures by scale.
@@ -175,14 +191,6 @@ class RockMassAnswer(Result):
 def _of_average(average: Mapping[str, Any]) -> str:
     """Return a mean probability with its confidence interval."""
     return with_interval(average["probability"], average["ci_low"], average["ci_high"])
-
-
-def _of_scale(motion: str, scale: Mapping[str, Any]) -> str:
-    """Return the fraction of the blocks that fails under a scaled motion."""
-    of_all, unknown = scale["all"]["fails_of_all"], scale["all"]["open_of_all"]
-    share = with_interval(of_all["share"], of_all["ci_low"], of_all["ci_high"])
-    undetermined = f"; {percent(unknown)} undetermined" if unknown else ""
-    return f"{motion} × {scale['scale']:g}: {share} of the blocks fail{undetermined}"
 
 
 def _mode_table(document: Mapping[str, Any]) -> TextTable:
@@ -329,7 +337,11 @@ def rockmass(
         DatabaseError: the database cannot be read.
     """
     UnknownFieldError.reject(question, RockMassQuestion, "a rock mass")
-    blocks = _rock_mass(mass).realise(n, seed)
+    if isinstance(mass, Mapping):
+        mass = rock_mass_of_tables(mass)
+    elif not isinstance(mass, RockMass):
+        mass = read_rock_mass(as_path(mass, "mass", "a rock mass"))
+    blocks = mass.realise(n, seed)
     options: dict[str, Any] = {name: value for name, value in question.items() if value is not None}
 
     def of(names: Iterable[str]) -> dict[str, Any]:
@@ -356,9 +368,52 @@ def rockmass(
     return RockMassAnswer(blocks, answer, ran, level, tuple(warnings))
 
 
-def _rock_mass(source: object) -> RockMass:
-    if isinstance(source, RockMass):
-        return source
-    if isinstance(source, Mapping):
-        return rock_mass_of_tables(source)
-    return read_rock_mass(as_path(source, "mass", "a rock mass"))
+WORTH_A_PROCESS = 500
+"""Blocks below which a worker process takes longer to start than to work."""
+
+
+def shake(
+    blocks: Realisations,
+    motion: GroundMotion,
+    *,
+    jobs: int | None = None,
+    on_progress: Callable[[CampaignProgress], None] | None = None,
+    **shaking: Unpack[ShakingOptions],
+) -> ShakenMass:
+    """Simulate every block of a rock mass that a motion moves, each in its own mode.
+
+    The answer does not depend on the number of workers.
+
+    Args:
+        jobs: worker processes; None for one per processor, where there is work enough for them.
+        on_progress: called at the beginning and after each chunk of work; counts blocks.
+        shaking: as for :func:`rbfrag.rockmasses.shaking.plan_shaking`.
+
+    Raises:
+        InputError: as for :func:`rbfrag.rockmasses.shaking.plan_shaking`; `jobs` below 1;
+            a block that cannot be run.
+        WorkFailedError: a worker died.
+    """
+    if jobs is not None and jobs < 1:
+        raise InputError(f"jobs must be at least 1, not {jobs}", fields=("jobs",))
+    plan = plan_shaking(blocks, motion, **shaking)
+    total = int(plan.indices.size)
+    workers = min(jobs or os.cpu_count() or 1, math.ceil(total / CHUNK))
+    if jobs is None and total < WORTH_A_PROCESS:
+        workers = 1
+    started = time.perf_counter()
+
+    def reported(answers: Iterator[BlockOutcomes]) -> Iterator[BlockOutcomes]:
+        completed = 0
+        if on_progress is not None and total:
+            on_progress(CampaignProgress(0, total, 0, 0.0))
+        for answer in answers:
+            completed += int(answer.place.size)
+            if on_progress is not None:
+                on_progress(CampaignProgress(completed, total, 0, time.perf_counter() - started))
+            yield answer
+
+    answers = run_locally(
+        run_blocks, plan.work(), workers, after_a_death="run the same command again"
+    )
+    return plan.gathered(reported(answers))

@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
+import os
+import platform
 import time
 from collections.abc import Callable, Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
 from typing import Any
 
 from sqlalchemy import Engine
 
-from rbfrag.campaign.executors.local import CLUSTER, executor
-from rbfrag.campaign.interrupt import Stopped
-from rbfrag.campaign.machine import processor_and_compiler
+from rbfrag.campaign.executors import CLUSTER, Stopped, executor
 from rbfrag.campaign.summary import CampaignProgress
 from rbfrag.db.campaigns import finish_campaign, start_campaign
 from rbfrag.errors import StoppedError, WorkFailedError
 from rbfrag.solver.results import NUMERICS_VERSION
+from rbfrag.version import __version__
 
 
 @dataclass(frozen=True)
@@ -91,3 +95,41 @@ class Workforce:
                 )
             with engine.begin() as connection:
                 finish_campaign(connection, campaign_id)
+
+
+def machine() -> dict[str, str | int | float | None]:
+    """Return processor, cores, load and versions; nothing that identifies the computer."""
+    versions: dict[str, str | None] = {"rbfrag": __version__}
+    for package in ("numpy", "numba", "scipy"):
+        try:
+            versions[package] = version(package)
+        except PackageNotFoundError:
+            versions[package] = None
+    load = None
+    with suppress(AttributeError, OSError):
+        load = round(os.getloadavg()[0], 2)  # average of the last minute
+    return {
+        "processor": _processor(),
+        "cores": os.cpu_count(),
+        "load": load,
+        "system": platform.system(),
+        "python": platform.python_version(),
+        **versions,
+    }
+
+
+def processor_and_compiler() -> str:
+    """Return processor and compiler; if both are equal, results are bit-identical."""
+    about = machine()
+    return f"{about['processor']}, numba {about['numba']}"
+
+
+def _processor() -> str:
+    try:
+        text = Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace")
+    except OSError:
+        return platform.processor() or platform.machine()
+    for line in text.splitlines():
+        if line.startswith("model name"):
+            return line.partition(":")[2].strip()
+    return platform.machine()

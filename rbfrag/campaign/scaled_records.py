@@ -18,7 +18,6 @@ from rbfrag.campaign.kind import Case, CaseRequest, CaseResult, Measures, Sequen
 from rbfrag.errors import InputError
 from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.kind import Shaking, SupportedBlock
-from rbfrag.solver.mechanism import ShakenMechanism, shaken_mechanism
 from rbfrag.solver.models import model_of_kind
 from rbfrag.solver.quantity import positive
 from rbfrag.solver.results import FloatArray
@@ -28,6 +27,7 @@ from rbfrag.solver.search.incremental_scaling import (
     rotation_rad,
     scaled_run,
 )
+from rbfrag.solver.simulation import ShakenMechanism, shaken_mechanism
 
 
 @dataclass(frozen=True)

@@ -5,21 +5,18 @@ from __future__ import annotations
 import math
 import os
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Literal, TypedDict, Unpack
 
 from sqlalchemy import Engine
 
-from rbfrag.campaign.executors.local import check_workers
-from rbfrag.campaign.horizontal_motions import MotionChoice
-from rbfrag.campaign.interrupt import Stopped, never
+from rbfrag.campaign.executors import Stopped, check_workers, never
 from rbfrag.campaign.kind import Case
 from rbfrag.campaign.kinds import campaign_kinds, campaign_of_kind
 from rbfrag.campaign.plan import (
     CampaignPlan,
     ExtraResults,
-    MotionTasks,
-    Todo,
+    MotionChoice,
     checked_ratios,
     plan_campaign,
     remaining_work,
@@ -29,7 +26,7 @@ from rbfrag.campaign.runner import Workforce
 from rbfrag.campaign.sequences import sequences_of_kind, simulate_sequences
 from rbfrag.campaign.summary import CampaignProgress as CampaignProgress
 from rbfrag.campaign.summary import CampaignSummary as CampaignSummary
-from rbfrag.campaign.worker import MotionResults, MotionWork, TaskResult, run_work
+from rbfrag.campaign.worker import MotionResults, MotionWork, Task, TaskResult, run_work
 from rbfrag.db.campaigns import (
     CombinationRecord,
     KnownCombination,
@@ -37,16 +34,15 @@ from rbfrag.db.campaigns import (
     add_maps,
     insert_combinations,
     insert_points,
+    insert_responses,
+    store_spectrum,
 )
 from rbfrag.db.engine import opened_database
 from rbfrag.db.motions import load_motion
-from rbfrag.db.responses import insert_responses
 from rbfrag.db.rows import Vertical
-from rbfrag.db.spectra import store_spectrum
 from rbfrag.errors import InputError, UnknownFieldError, WorkFailedError
-from rbfrag.solver.critical_result import CriticalResult
 from rbfrag.solver.quantity import positive
-from rbfrag.solver.results import MAP_DEPTH
+from rbfrag.solver.results import MAP_DEPTH, Polarity
 
 SAME_VALUE = 1e-9
 """Relative difference up to which a search that is repeated on another processor is the same."""
@@ -67,6 +63,7 @@ class CampaignOptions(TypedDict, total=False):
     restitution_factors: Sequence[float] | None
     vertical: Vertical
     include_structures: bool
+    where: str | None
     grid: int | Sequence[float] | None
     store_responses: Sequence[float | Literal["critical"]] | None
     full_map: bool
@@ -111,6 +108,8 @@ def simulate(
         vertical: ``without`` vertical motion (if left out), ``with`` that of the same recording,
             or ``both``.
         include_structures: use motions of sensors on structures, which are excluded by default.
+        where: only motions that meet this condition over their metadata and measures, such as
+            ``"vs30_m_s > 600 and magnitude >= 6"``.
         grid: toppling: run more blocks for themselves: at these k_r/PGA, or at that many from
             0.99 down to 0.01, equally spaced in the logarithm.
         store_responses: toppling: keep the motion in time of blocks of these k_r/PGA;
@@ -139,8 +138,10 @@ def simulate(
     workforce = Workforce(jobs, scheduler, on_progress, stopped)
     suite, vertical = request.get("suite"), request.get("vertical", "without")
     motions: MotionChoice = {
-        "suite": suite, "include_structures": request.get("include_structures", False)
-    }  # fmt: skip
+        "suite": suite,
+        "include_structures": request.get("include_structures", False),
+        "where": request.get("where"),
+    }
     full_map, histories = request.get("full_map", False), request.get("store_responses")
     options: dict[str, Any] = {
         name: value for name, value in request.items() if value is not None and value is not False
@@ -170,20 +171,21 @@ def simulate(
     with opened_database(db) as engine:
         with engine.connect() as connection:
             plan = plan_campaign(connection, kind, cases, vertical=vertical, **motions)
-            todo = remaining_work(connection, plan, extra)
+            todo, stored = remaining_work(connection, plan, extra)
         settings = {
             "kind": kind,
             "suite": suite,
+            "where": motions["where"],
             "vertical": vertical,
             **{name: list(value) for name, value in described.items() if name != "family"},
             "grid": list(extra.blocks),
             "store_responses": list(map(str, histories or ())),
             "map_depth": depth if full_map else None,
         }
-        run = _Run(engine, plan, todo)
-        work = (_with_samples(engine, tasks, depth) for tasks in todo.motions)
+        run = _Run(engine, plan, stored, lacking=sum(len(tasks) for _, tasks, _ in todo))
+        work = (_with_samples(engine, *motion_tasks, depth) for motion_tasks in todo)
         workforce.carry_out(
-            engine, settings, run_work, work, len(todo.motions), run.take, total=run.total,
+            engine, settings, run_work, work, len(todo), run.take, total=run.total,
             resumed=run.resumed, started=started,
         )  # fmt: skip
     return run.summary(time.perf_counter() - started)
@@ -207,12 +209,19 @@ def _cases(kind: str, described: dict[str, Any], names: Sequence[str]) -> tuple[
 class _Run:
     """Writer of one campaign, with its counts."""
 
-    def __init__(self, engine: Engine, plan: CampaignPlan, todo: Todo) -> None:
+    def __init__(
+        self,
+        engine: Engine,
+        plan: CampaignPlan,
+        stored: dict[str, KnownCombination],
+        *,
+        lacking: int,
+    ) -> None:
         self._engine = engine
         self._plan = plan
-        self._combinations = dict(todo.combinations)
+        self._combinations = stored
         self.total = len(plan.cases)
-        self.resumed = self.total - todo.tasks
+        self.resumed = self.total - lacking
         self._runs = self._grid_runs = self._responses = 0
 
     def take(self, campaign_id: int, results: MotionResults) -> int:
@@ -225,8 +234,12 @@ class _Run:
             self._grid_runs += 0 if result.blocks is None else len(result.blocks.outcome)
             self._responses += len(result.responses)
             if result.task.search or result.task.full_map:
-                key = result.task.planned.natural_key
-                self._combinations[key] = _as_known(result.critical)
+                state = KnownCombination(0, "not_searched", None, False, None)
+                if (now := result.critical) is not None:
+                    state = KnownCombination(
+                        0, now.status, now.kr_over_pga, now.certified, now.reentrant
+                    )
+                self._combinations[result.task.planned.natural_key] = state
         return len(results.results)
 
     def _compare(self, result: TaskResult) -> None:
@@ -267,14 +280,6 @@ class _Run:
         )
 
 
-def _as_known(result: CriticalResult | None) -> KnownCombination:
-    if result is None:
-        return KnownCombination(0, "not_searched", None, False, None)
-    return KnownCombination(
-        0, result.status, result.kr_over_pga, result.certified, result.reentrant
-    )
-
-
 def _extra_results(
     grid: int | Sequence[float] | None,
     store_responses: Sequence[float | Literal["critical"]] | None,
@@ -291,46 +296,42 @@ def _extra_results(
     )
 
 
-def _with_samples(engine: Engine, motion_tasks: MotionTasks, map_depth: float) -> MotionWork:
-    verticals = (task.planned.vertical_id for task in motion_tasks.tasks)
+def _with_samples(
+    engine: Engine,
+    motion_id: int,
+    tasks: tuple[Task, ...],
+    spectrum: Mapping[Polarity, Sequence[float]],
+    map_depth: float,
+) -> MotionWork:
+    verticals = (task.planned.vertical_id for task in tasks)
     up = next((vertical_id for vertical_id in verticals if vertical_id is not None), None)
     # the connection is given back before the work is: a reader would hold up the writer
     with engine.connect() as connection:
-        return MotionWork(
-            motion_id=motion_tasks.plan.motion.id,
-            motion=load_motion(connection, motion_tasks.plan.motion.id),
-            vertical=None if up is None else load_motion(connection, up),
-            tasks=motion_tasks.tasks,
-            spectrum=motion_tasks.spectrum,
-            map_depth=map_depth,
-        )
+        motion = load_motion(connection, motion_id)
+        vertical = None if up is None else load_motion(connection, up)
+    return MotionWork(motion_id, motion, vertical, tasks, spectrum, map_depth)
 
 
 def _store(engine: Engine, campaign_id: int, results: MotionResults) -> None:
-    new: list[TaskResult] = []
-    stored: list[TaskResult] = []
-    for result in results.results:
-        (new if result.task.search else stored).append(result)
+    by_key = {result.task.planned.natural_key: result for result in results.results}
+    stored = {key: result for key, result in by_key.items() if not result.task.search}
     records = [
         CombinationRecord(
-            natural_key=result.task.planned.natural_key,
+            natural_key=key,
             motion_id=results.motion_id,
             vertical_motion_id=result.task.planned.vertical_id,
+            polarity=result.task.planned.polarity,
             result=result.critical,
             grid=result.grid,
-            polarity=result.task.planned.polarity,
-            p2=result.task.planned.case.p2,
-            settings=result.task.planned.case.settings,
-            kind=result.task.planned.case.kind,
             numerics_version=results.numerics_version,
-            block=result.task.planned.case.block,
-            yield_g=result.task.planned.case.yield_g,
+            **vars(result.task.planned.case),
         )
-        for result in new
+        for key, result in by_key.items()
+        if result.task.search
     ]
-    grids = {r.task.planned.natural_key: r.grid for r in stored if r.grid is not None}
-    maps = {r.task.planned.natural_key: r.critical for r in stored if r.critical is not None}
-    blocks = {r.task.planned.natural_key: r.blocks for r in results.results if r.blocks is not None}
+    grids = {key: result.grid for key, result in stored.items() if result.grid is not None}
+    maps = {key: result.critical for key, result in stored.items() if result.critical is not None}
+    blocks = {key: result.blocks for key, result in by_key.items() if result.blocks is not None}
     responses = [record for result in results.results for record in result.responses]
     with engine.begin() as connection:
         insert_combinations(connection, campaign_id, records)
@@ -338,12 +339,8 @@ def _store(engine: Engine, campaign_id: int, results: MotionResults) -> None:
         add_maps(connection, maps)
         insert_points(connection, blocks)
         insert_responses(connection, responses)
-        for part in results.spectrum:
+        for polarity, (p2, x_m_s) in results.spectrum.items():
             store_spectrum(
-                connection,
-                results.motion_id,
-                polarity=part.polarity,
-                p2=part.p2,
-                x_m_s=part.x_m_s,
+                connection, results.motion_id, polarity=polarity, p2=p2, x_m_s=x_m_s,
                 numerics_version=results.numerics_version,
-            )
+            )  # fmt: skip

@@ -84,32 +84,24 @@ class SequenceReport(Tabular):
 
     def text_table(self) -> TextTable:
         """Return the conditional fragility as a terminal table."""
-        return TextTable(CONDITIONAL, [_conditional_cells(row) for row in self.conditional])
-
-
-def _conditional_cells(row: ConditionalShare) -> tuple[object, ...]:
-    limit = "recovery"
-    if row.displacement_m is not None:
-        limit = f"{row.displacement_m:g} m"
-    elif row.rotation_deg is not None:
-        limit = f"{row.rotation_deg:g}°"
-    state, most = "none", row.pga_over_yield_to
-    if row.state_to > 0.0:
-        state = interval(row.state_from, row.state_to)
-    ratios = f"over {row.pga_over_yield_from:g}"
-    return (
-        limit,
-        state,
-        ratios if most is None else f"{row.pga_over_yield_from:g}–{most:g}",
-        row.blocks,
-        row.earthquakes,
-        row.of_station,
-        percent(row.probability),
-        interval(row.ci_low, row.ci_high),
-        percent(row.intact_probability),
-        interval(row.intact_ci_low, row.intact_ci_high),
-        None if row.ratio is None else rounded(row.ratio),
-    )
+        rows = []
+        for row in self.conditional:
+            limit = "recovery"
+            if row.displacement_m is not None:
+                limit = f"{row.displacement_m:g} m"
+            elif row.rotation_deg is not None:
+                limit = f"{row.rotation_deg:g}°"
+            state = interval(row.state_from, row.state_to) if row.state_to > 0.0 else "none"
+            least, most = row.pga_over_yield_from, row.pga_over_yield_to
+            ratios = f"over {least:g}" if most is None else f"{least:g}–{most:g}"
+            probability = percent(row.probability), interval(row.ci_low, row.ci_high)
+            intact = interval(row.intact_ci_low, row.intact_ci_high)
+            ratio = None if row.ratio is None else rounded(row.ratio)
+            rows.append((
+                limit, state, ratios, row.blocks, row.earthquakes, row.of_station, *probability,
+                percent(row.intact_probability), intact, ratio,
+            ))  # fmt: skip
+        return TextTable(CONDITIONAL, rows)
 
 
 @dataclass(frozen=True, repr=False)

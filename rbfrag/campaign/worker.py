@@ -6,10 +6,10 @@ from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from rbfrag.campaign.kind import Case, CaseRequest, SingleBlockCampaign
+from rbfrag.campaign.kind import Case, CaseRequest, CaseResult, SingleBlockCampaign
 from rbfrag.campaign.kinds import campaign_of_kind
+from rbfrag.db.campaigns import ResponseRecord
 from rbfrag.db.keys import response_key
-from rbfrag.db.responses import ResponseRecord
 from rbfrag.db.rows import MotionRow
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.toppling_spectrum import toppling_spectrum
@@ -70,14 +70,8 @@ class Task:
     @property
     def asks(self) -> bool:
         """True if any work remains."""
-        return bool(
-            self.search
-            or self.grid
-            or self.full_map
-            or self.blocks
-            or self.histories
-            or self.critical_history
-        )
+        parts = (self.search, self.grid, self.full_map, self.blocks, self.histories)
+        return any(parts) or self.critical_history
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,11 +94,9 @@ class TaskResult:
     @property
     def runs(self) -> int:
         """Number of simulations."""
-        count = 0 if self.critical is None else self.critical.n_runs
-        count += sum(
-            len(points.outcome) for points in (self.grid, self.blocks) if points is not None
-        )
-        return count + len(self.responses)
+        searched = 0 if self.critical is None else self.critical.n_runs
+        points = sum(len(part.outcome) for part in (self.grid, self.blocks) if part is not None)
+        return searched + points + len(self.responses)
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,21 +118,16 @@ class MotionWork:
 
 
 @dataclass(frozen=True, eq=False)
-class SpectrumPart:
-    """X(p) [m/s] of one motion and polarity at frequency parameters p² [1/s²]."""
-
-    polarity: Polarity
-    p2: tuple[float, ...]
-    x_m_s: FloatArray
-
-
-@dataclass(frozen=True, eq=False)
 class MotionResults:
-    """Results in the order of the tasks, and the numerics version of the worker."""
+    """Results in the order of the tasks, and the numerics version of the worker.
+
+    Args:
+        spectrum: p² [1/s²] and X(p) [m/s] of the toppling spectrum, by polarity.
+    """
 
     motion_id: int
     results: tuple[TaskResult, ...]
-    spectrum: tuple[SpectrumPart, ...]
+    spectrum: Mapping[Polarity, tuple[Sequence[float], FloatArray]]
     numerics_version: str
 
 
@@ -156,10 +143,10 @@ def run_work(work: MotionWork) -> MotionResults:
     for tasks in groups.values():
         for result in _run_group(work, tasks):
             by_key[result.task.planned.natural_key] = result
-    spectrum = tuple(
-        SpectrumPart(polarity, tuple(p2), toppling_spectrum(work.motion, list(p2), polarity))
+    spectrum = {
+        polarity: (p2, toppling_spectrum(work.motion, p2, polarity))
         for polarity, p2 in work.spectrum.items()
-    )
+    }
     results = tuple(by_key[task.planned.natural_key] for task in work.tasks)
     return MotionResults(work.motion_id, results, spectrum, NUMERICS_VERSION)
 
@@ -171,14 +158,13 @@ def _run_group(work: MotionWork, tasks: list[Task]) -> list[TaskResult]:
     vertical = None if first.planned.vertical_id is None else work.vertical
     shaking = Shaking(work.motion, vertical, first.planned.polarity)
     search = first.search or first.full_map
-    answers: list[tuple[CriticalResult | None, SearchPoints | None]] = [(None, None)] * len(tasks)
+    answers = [CaseResult(None, None)] * len(tasks)
     if search or first.grid:
         request = CaseRequest(search, first.grid, first.full_map, work.map_depth)
-        cases = [task.planned.case for task in tasks]
-        results_of_cases = kind.run_cases(shaking, cases, request)
-        answers = [(result.critical, result.grid) for result in results_of_cases]
+        answers = kind.run_cases(shaking, [task.planned.case for task in tasks], request)
     results = []
-    for task, (critical, grid) in zip(tasks, answers, strict=True):
+    for task, answer in zip(tasks, answers, strict=True):
+        critical = answer.critical
         blocks = None
         if task.blocks:
             assert isinstance(kind, SingleBlockCampaign)
@@ -188,7 +174,7 @@ def _run_group(work: MotionWork, tasks: list[Task]) -> list[TaskResult]:
         if task.critical_history and value is not None:
             ratios.append(value)
         histories = (_history(work, task.planned, shaking, k) for k in dict.fromkeys(ratios))
-        results.append(TaskResult(task, critical, grid, blocks, tuple(histories)))
+        results.append(TaskResult(task, critical, answer.grid, blocks, tuple(histories)))
     return results
 
 

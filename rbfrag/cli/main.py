@@ -6,6 +6,7 @@ so that `rbfrag predict` starts without numba, pandas or matplotlib.
 
 from __future__ import annotations
 
+import codecs
 import os
 import signal
 import sys
@@ -15,13 +16,11 @@ try:
     from typing import Annotated, Any
 
     import typer
-    from typer.core import TyperGroup
 
-    from rbfrag.cli.parameters.option_groups import read_plainly
-    from rbfrag.cli.streams import end_unwritten, write_plainly
-    from rbfrag.errors import InputError, RbfragError
+    from rbfrag.cli.command import CommandGroup, Commands, name_in_errors, words_of
+    from rbfrag.errors import InputError, RbfragError, one_paragraph
     from rbfrag.version import __version__
-    from rbfrag.vocabulary.quantities import option_of
+    from rbfrag.vocabulary.quantities import MEASURED, ONLY_PREDICT, name_of, option_of
 except KeyboardInterrupt:  # Ctrl-C while libraries load
     raise SystemExit(130) from None
 
@@ -33,7 +32,7 @@ shared, and threads that wait for one another on a busy machine spin
 COMMANDS = {
     "block": "Print the failure mode, yield accelerations and p² of a block.",
     "rockmass": "Sample blocks from two joint sets; print their modes and yields.",
-    "motions": "Add, list, show and export accelerograms.",
+    "motions": "Add, list, show, rotate and export accelerograms.",
     "respond": "Compute the response of a block to an accelerogram.",
     "critical": "Compute the critical strength of an accelerogram, with bounds.",
     "spectrum": "Compute the toppling spectrum X(p) of accelerograms.",
@@ -71,26 +70,61 @@ _OPTIONS = {
 """Options of campaigns and searches that Python calls otherwise."""
 
 
-def _option(name: str) -> str:
-    return _OPTIONS.get(name) or option_of(name)
+def usage_message(error: Any) -> str:
+    """Return the message of a usage error of typer."""
+    context = error.ctx
+    option: Any = getattr(error, "option_name", None)
+    parameter = getattr(error, "param", None)
+    message = one_paragraph(error.format_message())
+    if hasattr(error, "possibilities"):
+        options = [
+            name
+            for option_parameter in context.command.get_params(context)
+            for name in option_parameter.opts
+        ]
+        message = f"unknown option {option}{_suggestion(option, options)}"
+        if name_of(option.lstrip("-").replace("-", "_")) in MEASURED:
+            message = ONLY_PREDICT.format(option)
+    elif option is not None:
+        takes = "requires a value" if "requires" in message else "takes no value: omit it"
+        message = f"{option} {takes}"
+    elif parameter is not None:
+        message = f"{name_in_errors(parameter)} is missing: {parameter.help}"
+    elif message.startswith("No such command '"):
+        word = message.split("'")[1]
+        message = f"unknown command {word!r}{_suggestion(word, [*context.command.commands])}"
+    elif message.startswith("Got unexpected"):
+        message = f"unexpected argument {message.partition(' (')[2].rpartition(')')[0]}"
+    return message if context is None else f"{message} (help: {words_of(context)} --help)"
+
+
+def _suggestion(typed: str, words: list[str]) -> str:
+    """Return the nearest of some words as a question."""
+    from difflib import get_close_matches
+
+    # the name of a field in Python or in a table is an option, too
+    near = [option_of(name_of(typed.lstrip("-").replace("-", "_")))]
+    near = [name for name in near if name in words] or [
+        name for name in words if len(typed) > len("--") and name.startswith(typed)
+    ]
+    near = near[:3] or get_close_matches(typed, words, 1)
+    *first, last = near or [""]
+    return f"; did you mean {' or '.join(filter(None, (', '.join(first), last)))}?" if last else ""
 
 
 def _ended(error: Any) -> Any:
     """Return what ends a wrong command line after its message; help in place of it stays."""
     if type(error).__name__ == "NoArgsIsHelpError":
         return error
-    from rbfrag.cli.usage import usage_message
-
     print(f"rbfrag: {usage_message(error)}", file=sys.stderr)
     return typer.Exit(error.exit_code)
 
 
-class _Commands(TyperGroup):
+class _Commands(CommandGroup):
     """Loads a command on its call, and turns expected errors into messages."""
 
     def __init__(self, **about: Any) -> None:
         super().__init__(**about)
-        read_plainly(self)
         names: Any = dict.fromkeys(COMMANDS)
         self.commands = names  # for suggestions after a typing error
 
@@ -101,11 +135,10 @@ class _Commands(TyperGroup):
         module = import_module(f"rbfrag.cli.commands.{name}")
         group = getattr(module, "app", None)
         if group is None:
-            group = typer.Typer(rich_markup_mode=None, add_completion=False)
+            group = Commands()
             group.command(cmd_name, epilog=module.EXAMPLE)(getattr(module, name))
         command = typer.main.get_command(group)
         command.name = cmd_name
-        read_plainly(command)
         return command
 
     def format_commands(self, _: Any, formatter: Any) -> None:
@@ -117,7 +150,10 @@ class _Commands(TyperGroup):
         try:
             return super().invoke(ctx)
         except RbfragError as error:
-            print(f"rbfrag: {error.spelled(_option)}", file=sys.stderr)
+            from rbfrag.cli.output import typed_option
+
+            text = error.spelled(lambda name: _OPTIONS.get(name) or typed_option(name))
+            print(f"rbfrag: {text}", file=sys.stderr)
             raise typer.Exit(error.exit_status) from None
         except OSError as error:
             if error.filename is None:  # a closed pipe, say
@@ -165,6 +201,39 @@ def _options(
     ] = False,
 ) -> None:
     pass
+
+
+_IN_ASCII = {
+    "²": "2", "³": "3", "⁻": "-", "·": "*", "±": "+-", "–": "-", "−": "-", "…": "...", "≥": ">=",
+    "≤": "<=", "°": " deg", "π": "pi", "φ": "phi", "β": "beta", "θ": "theta", "σ": "sigma",
+    "Å": "A", "ø": "o", "é": "e",
+}  # fmt: skip
+"""What stands for a character that a stream cannot write; "?" for any other."""
+
+
+def _plainly(error: UnicodeError) -> tuple[str, int]:
+    if not isinstance(error, UnicodeEncodeError):
+        raise error
+    text = error.object[error.start : error.end]
+    return "".join(_IN_ASCII.get(character, "?") for character in text), error.end
+
+
+def write_plainly() -> None:
+    """Replace characters that a stream cannot encode, instead of failing."""
+    codecs.register_error("plainly", _plainly)
+    for stream in (sys.stdout, sys.stderr):
+        reconfigure = getattr(stream, "reconfigure", None)
+        if reconfigure is not None:
+            reconfigure(errors="plainly")
+
+
+def end_unwritten(error: OSError) -> None:
+    """End with status 1 and an explanation where output cannot be written."""
+    if not isinstance(error, BrokenPipeError):  # nobody reads on, which is no error
+        print(f"rbfrag: the answer cannot be written: {error.strerror}", file=sys.stderr)
+    # what is left unwritten would be tried again, and complained of, when the program ends
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    raise SystemExit(1)
 
 
 def run() -> None:

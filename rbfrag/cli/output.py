@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from rbfrag.errors import InputError, spelled
 from rbfrag.results.diagnostic import Diagnostic, by_severity, with_diagnostics
-from rbfrag.vocabulary.quantities import QUESTION, option_of
+from rbfrag.vocabulary.quantities import OTHER_WORDS, QUESTION, option_of
 
 if TYPE_CHECKING:
     from rich.progress import Progress as RichProgress
@@ -28,13 +28,6 @@ def print_json(document: object) -> None:
     """Print one JSON document on standard output."""
     document = with_diagnostics(document)
     print(json.dumps(document, indent=2, ensure_ascii=False, allow_nan=False))
-
-
-def print_sentences(sentences: Iterable[str]) -> None:
-    """Print sentences, one per line, and an empty line."""
-    for sentence in sentences:
-        print(sentence)
-    print()
 
 
 def print_pairs(pairs: Mapping[str, object]) -> None:
@@ -104,7 +97,7 @@ def print_result(
     notes = by_severity(result.warnings)
     questions = [note for note in notes if note.code == "check_unit"]
     sentences = [*result.sentences()]
-    print_sentences((*questions, *sentences))
+    print(*questions, *sentences, "", sep="\n")
     for label, text in result.lines():
         print_labelled(label, text)
     for note in notes:
@@ -124,9 +117,17 @@ def print_result(
             print_pairs({str(name): value for name, value in table.rows})
 
 
+def typed_option(name: str) -> str:
+    """Return the option of an input, by its other word if the command line has that."""
+    by_name = {of: f"--{word.replace('_', '-')}" for word, of in OTHER_WORDS.items()}
+    typed = {argument.partition("=")[0] for argument in sys.argv[1:]}
+    is_typed = name in by_name and typed & {*by_name.values()}
+    return by_name[name] if is_typed else option_of(name)
+
+
 def print_labelled(label: str, text: str) -> None:
     """Print a line of an answer with its label: "Model     bounded-pgv_kr, …"."""
-    print(f"{label:<10}{spelled(text, (), option_of)}")
+    print(f"{label:<9} {spelled(text, (), typed_option)}")
 
 
 def print_warnings(warnings: Iterable[str], fields: Collection[str] = ()) -> None:
@@ -139,7 +140,7 @@ def print_warnings(warnings: Iterable[str], fields: Collection[str] = ()) -> Non
 
 def print_warning(warning: Diagnostic, fields: Collection[str] = ()) -> None:
     """Print a warning or note with its label, and with fields as options."""
-    print_labelled(warning.label, spelled(warning, ("excel_text", *fields), option_of))
+    print_labelled(warning.label, spelled(warning, ("excel_text", *fields), typed_option))
 
 
 def write_table(
@@ -152,7 +153,7 @@ def write_table(
     """Write the table of a command with its warnings; warn of texts that spreadsheets read as
     formulas.
     """
-    from rbfrag.exchange.excel_text import formula_warnings
+    from rbfrag.exchange.tables.csv_file import formula_warnings
     from rbfrag.exchange.tables.files import write_block_table
 
     formulas: tuple[str, ...] = ()
@@ -168,14 +169,14 @@ def say_when_compiling() -> None:
     """Explain once why the first answer takes long: kernels are compiled on this machine."""
     from rbfrag.solver.integrator.compiled import on_compilation
 
-    on_compilation(_say_compiling)
+    on_compilation(_announce_compilation)
 
 
-def _say_compiling() -> None:
+# worker processes receive it by its name
+def _announce_compilation() -> None:
     from rbfrag.solver.integrator.compiled import where_kept
 
-    often = where_kept() or "once"
-    text = f"compiling the kernels for this machine; this happens {often}"
+    text = f"compiling the kernels for this machine; this happens {where_kept() or 'once'}"
     print(text, file=sys.stderr, flush=True)
 
 

@@ -27,7 +27,7 @@ from sqlalchemy import (
 )
 from sqlalchemy.dialects import postgresql, sqlite
 
-from rbfrag.db.digest import NOT_DIGESTED, ValueType, row_digests
+from rbfrag.db.keys import NOT_DIGESTED, ValueType, row_digests
 from rbfrag.db.ledger import tally
 from rbfrag.db.schema import metadata
 from rbfrag.errors import DatabaseError
@@ -35,6 +35,9 @@ from rbfrag.errors import DatabaseError
 # psycopg forgets the count when the cursor closes, unless it is asked to keep it
 _COUNTED = {"preserve_rowcount": True}
 _KEYS_AT_ONCE = 500
+_VALUE_TYPES: tuple[tuple[type, ValueType], ...] = (
+    (Boolean, "boolean"), (Float, "float"), (Integer, "integer"), (LargeBinary, "bytes")
+)  # fmt: skip
 _ROWS_AT_ONCE = 5_000
 
 
@@ -203,18 +206,11 @@ def _digested(table: Table, values: Mapping[str, object]) -> dict[str, object]:
 @cache
 def _digested_columns(table: Table) -> dict[str, ValueType]:
     """Return the types of the columns in the digest, by name, in the order of names."""
-    names = sorted(column.name for column in table.c if column.name not in NOT_DIGESTED)
-    return {name: _value_type(table.c[name].type) for name in names}
-
-
-def _value_type(column_type: Any) -> ValueType:
-    if isinstance(column_type, Boolean):
-        return "boolean"
-    if isinstance(column_type, Float):
-        return "float"
-    if isinstance(column_type, Integer):
-        return "integer"
-    return "bytes" if isinstance(column_type, LargeBinary) else "text"
+    return {
+        name: next((value for kind, value in _VALUE_TYPES if isinstance(column.type, kind)), "text")
+        for name, column in sorted(table.c.items())
+        if name not in NOT_DIGESTED
+    }
 
 
 def utc_now() -> str:
@@ -237,27 +233,27 @@ def renew_digests(connection: Connection, table: Table, before: Table | None = N
     change = (
         update(table)
         .where(*(key == bindparam(f"at_{key.name}") for key in keys))
-        .values(digest=bindparam("anew"))
+        .values(digest=bindparam("renewed"))
     )
     # read by key and not by one open cursor, which writing to the same table would disturb
-    query = select(table).order_by(*keys).limit(_ROWS_AT_ONCE)
+    holds_arrays = any(isinstance(column.type, LargeBinary) for column in table.c)
+    query = select(table).order_by(*keys).limit(16 if holds_arrays else _ROWS_AT_ONCE)
     rows = connection.execute(query).all()
     while rows:
-        values = [tuple(row) for row in rows]
-        sound = [True] * len(rows)
+        expected = [row.digest for row in rows]
         if before is not None:
-            had = [tuple(row._mapping[name] for name in before.c.keys()) for row in rows]  # noqa: SIM118
-            then = table_digests(before, before.c.keys(), had)
-            sound = [row.digest == digest for row, digest in zip(rows, then, strict=True)]
-        anew = table_digests(table, columns, values)
+            names = [column.name for column in before.c]
+            values = [[row._mapping[name] for name in names] for row in rows]
+            expected = table_digests(before, names, values)
+        renewed = table_digests(table, columns, rows)
         intact = [
-            pair
-            for pair, is_sound in zip(zip(rows, anew, strict=True), sound, strict=True)
-            if is_sound
+            (row, digest)
+            for row, digest, former in zip(rows, renewed, expected, strict=True)
+            if row.digest == former
         ]
         if intact:
             changes = [
-                {"anew": digest} | {f"at_{key.name}": row._mapping[key.name] for key in keys}
+                {"renewed": digest} | {f"at_{key.name}": row._mapping[key.name] for key in keys}
                 for row, digest in intact
             ]
             connection.execute(change, changes)

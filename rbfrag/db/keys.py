@@ -1,4 +1,7 @@
-"""Natural keys: hashes of all inputs of a stored result."""
+"""Hashes: natural keys of results, and digests of rows, which reveal altered ones.
+
+Standard library only: a model that `rbfrag predict` reads can be verified without SQLAlchemy.
+"""
 
 from __future__ import annotations
 
@@ -6,8 +9,9 @@ import hashlib
 import json
 import math
 import numbers
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from collections.abc import Mapping, Sequence
+from hashlib import blake2b
+from typing import TYPE_CHECKING, Any, Literal
 
 from rbfrag.errors import InputError
 
@@ -151,3 +155,38 @@ def _storable(value: object) -> object:
     if isinstance(value, list | tuple):
         return [_storable(item) for item in value]
     raise InputError(f"{value!r} ({type(value).__name__}) cannot be stored as a setting")
+
+
+ValueType = Literal["float", "integer", "boolean", "text", "bytes"]
+
+NOT_DIGESTED = ("id", "digest")
+"""Columns outside the digest: the row number, which only its insertion gives, and itself."""
+
+
+def row_digests(types: Sequence[ValueType], columns: Sequence[Sequence[Any]]) -> list[int]:
+    """Return the digest of each row: the first 8 bytes of a BLAKE2b hash, as a signed integer.
+
+    It is that of the values as both databases give them back: integral numbers in a column of
+    float64 are floats, -0.0 is 0.0, arrays stand for themselves by their own hash.
+
+    Args:
+        types: of the columns, in the order of the columns' names.
+        columns: the values of each column, None where missing.
+    """
+    rows = zip(*map(_canonical, types, columns), strict=True)
+    return [
+        int.from_bytes(blake2b(ascii(row).encode("ascii"), digest_size=8).digest(), signed=True)
+        for row in rows
+    ]
+
+
+def _canonical(kind: ValueType, values: Sequence[Any]) -> list[Any]:
+    if kind == "float":
+        return [None if v is None else float(v) + 0.0 for v in values]
+    if kind == "text":
+        return [None if v is None else str(v) for v in values]
+    if kind == "integer":
+        return [None if v is None else int(v) for v in values]
+    if kind == "boolean":
+        return [None if v is None else bool(v) for v in values]
+    return [None if v is None else blake2b(v, digest_size=16).hexdigest() for v in values]

@@ -7,12 +7,12 @@ it. It is kept in memory and written by one statement when the transaction commi
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from functools import reduce
 from itertools import groupby, repeat
 from operator import itemgetter, xor
 
-from sqlalchemy import Connection, Engine, Table, delete, event, func, inspect, select, update
+from sqlalchemy import Connection, Engine, Table, delete, event, func, select, update
 
 from rbfrag.db.schema import combination, ledger, metadata
 
@@ -35,6 +35,7 @@ _WRITE = (
 def keep_ledger(engine: Engine) -> None:
     """Write the counts of :func:`tally` in each transaction of an engine."""
     event.listen(engine, "begin", _forget)
+    event.listen(engine, "rollback", _forget)
     event.listen(engine, "commit", _write)
 
 
@@ -64,11 +65,6 @@ def tally(
         _write(connection)
 
 
-def has_ledger(connection: Connection) -> bool:
-    """Return whether a database has a ledger; schema 0008 and earlier have none."""
-    return inspect(connection).has_table(ledger.name)
-
-
 def written_tallies(connection: Connection) -> Tallies:
     """Return the ledger, including the open transaction."""
     _write(connection)
@@ -78,11 +74,20 @@ def written_tallies(connection: Connection) -> Tallies:
 
 def stored_tallies(connection: Connection) -> Tallies:
     """Return the counts and digests of the stored rows."""
-    return {
-        (name, campaign): sums
-        for name, table in sorted(metadata.tables.items())
-        for campaign, sums in _by_campaign(connection, table).items()
-    }
+    tallies: Tallies = defaultdict(lambda: (0, 0))
+    for name, table in sorted(metadata.tables.items()):
+        query = select(table.c.digest)
+        if "campaign_id" in table.c:
+            query = query.add_columns(table.c.campaign_id)
+        elif "combination_id" in table.c:
+            query = query.add_columns(combination.c.campaign_id).join(combination)
+        rows = connection.execute(query, execution_options={"yield_per": 10_000})
+        for digest, *campaign in rows:
+            key = name, campaign[0] if campaign else 0
+            number, together = tallies[key]
+            # SQLite accepts any value; one that is not a digest is found by the check of digests
+            tallies[key] = number + 1, together ^ (digest if isinstance(digest, int) else 0)
+    return dict(tallies)
 
 
 def renew_ledger(connection: Connection) -> None:
@@ -93,54 +98,36 @@ def renew_ledger(connection: Connection) -> None:
 
 
 def note_sound(connection: Connection, time: str) -> None:
-    """Record that :func:`rbfrag.db.check.database.check_database` found nothing at that time."""
+    """Record that :func:`rbfrag.db.check.check_database` found nothing at that time."""
     connection.execute(update(ledger).values(found_sound=time))
 
 
 def last_sound(connection: Connection) -> str | None:
-    """Return the time of the last check without findings; None if never, or without a ledger."""
-    if not has_ledger(connection):
-        return None
+    """Return the time of the last check without findings; None if never."""
     time: str | None = connection.scalar(select(func.max(ledger.c.found_sound)))
     return time
 
 
-def _by_campaign(connection: Connection, table: Table) -> dict[int, tuple[int, int]]:
-    query = select(table.c.digest)
-    if "campaign_id" in table.c:
-        query = query.add_columns(table.c.campaign_id)
-    elif "combination_id" in table.c:
-        query = query.add_columns(combination.c.campaign_id).join(combination)
-    tallies: dict[int, tuple[int, int]] = defaultdict(lambda: (0, 0))
-    for digest, *campaign in connection.execute(query, execution_options={"yield_per": 10_000}):
-        whose = campaign[0] if campaign else 0
-        number, together = tallies[whose]
-        # SQLite holds anything anywhere; what is no digest is found by the check of digests
-        tallies[whose] = number + 1, together ^ (digest if isinstance(digest, int) else 0)
-    return tallies
-
-
 def _forget(connection: Connection) -> None:
-    connection.info.pop(_PENDING, None)
+    # what is noted with a connection goes with it when the server is gone
+    if not connection.invalidated:
+        connection.info.pop(_PENDING, None)
 
 
 def _write(connection: Connection) -> None:
     pending = connection.info.pop(_PENDING, {})
-    of_points = sorted({of for _, owner, of in pending if owner == "combination_id"})
-    campaigns = dict(_campaigns(connection, of_points))
+    combinations = sorted({of for _, owner, of in pending if owner == "combination_id"})
+    campaigns: dict[int, int] = {}
+    for start in range(0, len(combinations), _IDS_AT_ONCE):
+        id_list = ", ".join(map(str, combinations[start : start + _IDS_AT_ONCE]))
+        query = f"SELECT id, campaign_id FROM combination WHERE id IN ({id_list})"
+        campaigns.update((row[0], row[1]) for row in connection.exec_driver_sql(query))
     sums: Tallies = {}
     for (name, owner, of), (number, digests) in pending.items():
         key = name, campaigns[of] if owner == "combination_id" else of
         before = sums.get(key, (0, 0))
         sums[key] = before[0] + number, before[1] ^ digests
     _insert(connection, sums)
-
-
-def _campaigns(connection: Connection, ids: Sequence[int]) -> Iterator[tuple[int, int]]:
-    for start in range(0, len(ids), _IDS_AT_ONCE):
-        id_list = ", ".join(map(str, ids[start : start + _IDS_AT_ONCE]))
-        query = f"SELECT id, campaign_id FROM combination WHERE id IN ({id_list})"
-        yield from ((row[0], row[1]) for row in connection.exec_driver_sql(query))
 
 
 def _insert(connection: Connection, tallies: Tallies) -> None:

@@ -1,7 +1,7 @@
 """Location of the database and its supported schema, without loading SQLAlchemy.
 
-The schema is named apart from the migrations, so that `rbfrag predict` can check a database
-without loading Alembic; a test proves that both agree.
+The revisions of the schema are listed here as well as in the migrations, so that `rbfrag predict`
+can check a database without loading Alembic; a test compares both lists.
 """
 
 from __future__ import annotations
@@ -14,19 +14,16 @@ from pathlib import Path
 from rbfrag.errors import InputError, SchemaVersionError
 
 DEFAULT_NAME = "rbfrag.db"
-"""File name of the database in the current folder when nothing else is said."""
+"""File name of the database in the current folder if no other is given."""
 
-REFERENCE = Path(__file__).parents[1] / "reference" / "reference.db"
+REFERENCE = Path(__file__).resolve().parents[1] / "reference" / "reference.db"
 """The database that is shipped with rbfrag, read-only and without samples, if there is one."""
 
-REVISIONS = ("0007", "0008", "0009")
+REVISIONS = ("0001", "0002", "0003")
 """Every schema revision this rbfrag knows, oldest first."""
 
 SCHEMA_REVISION = REVISIONS[-1]
 """The revision that this rbfrag works with."""
-
-READABLE = ("0008", SCHEMA_REVISION)
-"""Revisions that are read as they are: 0009 only adds the ledger, which readers do without."""
 
 VERSION_TABLE = "rbfrag_revision"
 """Alembic's version table; its own name, so that a PostgreSQL schema may be shared."""
@@ -120,15 +117,14 @@ def sole_revision(revisions: Sequence[str], where: str) -> str | None:
     return revisions[0] if revisions else None
 
 
-def check_revision(revision: str, where: str, *, read_only: bool = False) -> None:
+def check_revision(revision: str, where: str) -> None:
     """Reject a database with an unsupported schema.
 
     Args:
         revision: the revision stored in the database.
         where: the database as the user names it, for the message.
-        read_only: whether it is only read.
     """
-    if revision == SCHEMA_REVISION or (read_only and revision in READABLE):
+    if revision == SCHEMA_REVISION:
         return
     if revision in REVISIONS:
         raise SchemaVersionError(

@@ -10,14 +10,14 @@ from __future__ import annotations
 import json
 import math
 import sqlite3
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass, field, fields, replace
 from os import PathLike
 from pathlib import Path
 from typing import Any
 
-from rbfrag.db.digest import ValueType, row_digests
+from rbfrag.db.keys import ValueType, row_digests
 from rbfrag.db.sqlite_file import check_sqlite_database, connect_sqlite, explained_sqlite_error
 from rbfrag.errors import DatabaseError, InputError, checked_name
 
@@ -139,20 +139,21 @@ def decode_model(values: Sequence[Any]) -> ModelRow:
     by_name: Mapping[str, Any] = dict(zip(STORED, values, strict=True))
     steps, dependence = by_name["leave_out_steps"], by_name["dependence"]
     try:
-        if _digest_of(by_name) != by_name["digest"]:
+        names = sorted(COLUMNS)
+        types = [_TYPES.get(name, "text") for name in names]
+        (digest,) = row_digests(types, [[by_name[name]] for name in names])
+        if digest != by_name["digest"]:
             raise ValueError("its digest differs: a value was altered after it was stored")
-        coefficients = {k: _finite(v) for k, v in json.loads(by_name["coefficients"]).items()}
-        domain = {
-            k: (_finite(a), _finite(b)) for k, (a, b) in json.loads(by_name["domain"]).items()
-        }
+        coefficients = json.loads(by_name["coefficients"])
+        ranges = json.loads(by_name["domain"])
         decoded = {
-            "coefficients": coefficients,
-            "covariance": _numbers(by_name["covariance"]),
-            "domain": domain,
+            "coefficients": dict(zip(coefficients, _floats(coefficients.values()), strict=True)),
+            "covariance": tuple(map(_floats, json.loads(by_name["covariance"]))),
+            "domain": {k: _floats((low, high)) for k, (low, high) in ranges.items()},
             "diagnostics": json.loads(by_name["diagnostics"]),
             "is_default": bool(by_name["is_default"]),
             "form": int(by_name["form"]),
-            "leave_out_steps": None if steps is None else _numbers(steps),
+            "leave_out_steps": None if steps is None else tuple(map(_floats, json.loads(steps))),
             "dependence": None if dependence is None else dict(json.loads(dependence)),
         }
         return ModelRow(**{**{name: by_name[name] for name in COLUMNS}, **decoded})
@@ -163,38 +164,15 @@ def decode_model(values: Sequence[Any]) -> ModelRow:
         ) from error
 
 
-def _digest_of(by_name: Mapping[str, Any]) -> int:
-    names = sorted(COLUMNS)
-    types = [_TYPES.get(name, "text") for name in names]
-    (digest,) = row_digests(types, [[by_name[name]] for name in names])
-    return digest
-
-
 def _lines(numbers: tuple[tuple[float, ...], ...]) -> str:
     return json.dumps([[float(v) for v in line] for line in numbers])
 
 
-def _numbers(lines: str) -> tuple[tuple[float, ...], ...]:
-    return tuple(tuple(_finite(v) for v in line) for line in json.loads(lines))
-
-
-def _finite(value: Any) -> float:
-    number = float(value)
-    if not math.isfinite(number):
-        raise ValueError(f"{number} is not a finite number")
-    return number
-
-
-RETIRED = {
-    "bounded-pgv": "bounded-pgv_kr",
-    "lognormal-pgv": "bounded-pgv_kr",
-    "logistic-sa03": "bounded-pga_sa03_sa10_sa30 (with PGA and SA(1.0), SA(3.0))",
-    "logistic-sa20": "logistic-sa10 (with SA(1.0))",
-    "logistic-sa30": "logistic-sa10 (with SA(1.0))",
-    "slumping-recovery-pgv": "slumping-recovery-pgv_pga (with PGA)",
-    "slumping-2deg-pgv": "slumping-2deg-pgv_pga (with PGA)",
-}
-"""What answers in the place of models that were shipped once."""
+def _floats(values: Iterable[Any]) -> tuple[float, ...]:
+    numbers = tuple(map(float, values))
+    if not all(map(math.isfinite, numbers)):  # thousands of numbers at each start
+        raise ValueError("one of its numbers is not finite")
+    return numbers
 
 
 def unknown_model(name: str | None, names: Sequence[str], where: str) -> str:
@@ -204,8 +182,6 @@ def unknown_model(name: str | None, names: Sequence[str], where: str) -> str:
         name: the name asked for; None for the default.
         where: the database as the user names it.
     """
-    if name in RETIRED:
-        return f"there is no model {name!r} any more: use {RETIRED[name]} in its place"
     if not names:
         return f"{where} holds no model yet: make one by rbfrag fit"
     if name is None:
@@ -291,7 +267,7 @@ def read_models(path: str | PathLike[str]) -> list[ModelRow]:
     """
     file = Path(path)
     with closing(connect_sqlite(file, read_only=True)) as connection:
-        check_sqlite_database(connection, file, read_only=True)
+        check_sqlite_database(connection, file)
         try:
             rows = [decode_model(row) for row in connection.execute(_SELECT)]
         except (sqlite3.Error, UnicodeDecodeError) as error:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from typing import Any
 
 from sqlalchemy import Connection, Select, and_, select
@@ -77,7 +78,10 @@ def load_model(connection: Connection, name: str | None = None) -> ModelRow:
     else:
         query = _model_query().where(fragility_model.c.name == name)
         stored = connection.execute(query).one_or_none()
-        default = None if stored is None else _with_default(connection, decode_model(stored))
+        default = None if stored is None else decode_model(stored)
+        # whether it is the default depends on the others, unless one of them is damaged
+        with suppress(DatabaseError):
+            default = next((row for row in model_rows(connection) if row.name == name), None)
     if default is None:
         names = names_of_models(connection)
         place = database_label(connection.engine.url)
@@ -85,12 +89,11 @@ def load_model(connection: Connection, name: str | None = None) -> ModelRow:
     return default
 
 
-def _with_default(connection: Connection, row: ModelRow) -> ModelRow:
-    """Return a model with its default flag; as stored if another model is damaged."""
-    try:
-        return next(model for model in model_rows(connection) if model.name == row.name)
-    except DatabaseError:
-        return row
+def store_dependence(connection: Connection, row: ModelRow) -> None:
+    """Store the dependence model of a stored model, and the diagnostics of its estimation."""
+    values = encode_model(row)
+    changed = {name: values[name] for name in ("dependence", "diagnostics")}
+    update_rows(connection, fragility_model, fragility_model.c.name == row.name, changed)
 
 
 def set_default(connection: Connection, name: str) -> None:

@@ -5,20 +5,22 @@ from __future__ import annotations
 import hashlib
 import json
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from datetime import datetime
-from typing import Any
+from types import MappingProxyType
+from typing import Any, cast
 
 import numpy as np
 from sqlalchemy import Connection, RowMapping, Select, and_, case, exists, or_, select
 
 from rbfrag.db import schema
+from rbfrag.db.conditions import condition_of_motions
 from rbfrag.db.insert import delete_rows, insert_if_new, storable, update_rows, utc_now
 from rbfrag.db.keys import canonical_json
-from rbfrag.db.rows import EarthquakeInfo, MotionRow
-from rbfrag.db.schema import MEASURES, earthquake, suite, suite_motion
-from rbfrag.db.stored_json import stored_json, stored_number
+from rbfrag.db.motion_spectra import renew_recording_spectra, store_spectrum
+from rbfrag.db.rows import EarthquakeInfo, MotionRow, stored_json, stored_number
+from rbfrag.db.schema import MEASURES, SITE_COLUMNS, earthquake, suite, suite_motion
 from rbfrag.errors import DatabaseError, InputError
 from rbfrag.motions.ground_motion import GroundMotion
 
@@ -28,15 +30,18 @@ COMPUTED = (*MEASURES, "final_velocity_m_s", "final_displacement_m")
 UNKNOWN_EVENT = "unknown event of "
 """How the id of an event begins of which nothing at all is known."""
 
+NOTHING: Mapping[str, object] = MappingProxyType({})
+
 _OF_ROWS = (
     "id", "component", "orientation_deg", "is_vertical", "dt_s", "npts", *COMPUTED, "source_file",
     "trace_index", "file_format", "processing", "source_sha256", "start_time",
 )  # fmt: skip
+_OF_RECORDING = ("station", "network", *SITE_COLUMNS)
 _LABELS = (
     "station", "component", "orientation_deg", "is_vertical", "recording", "source_file",
     "trace_index", "file_format",
 )  # fmt: skip
-_NUMBERS = ("orientation_deg", "dt_s", "npts", *COMPUTED, "trace_index")
+_NUMBERS = ("orientation_deg", "dt_s", "npts", *COMPUTED, "trace_index", *SITE_COLUMNS, "depth_km")
 # Sums over some 1e5 samples, in another order on another processor.
 _ROUNDING = 1e-9
 _ID_LIMIT = 2**31  # drivers reject larger integers in words of their own
@@ -54,6 +59,7 @@ def add_motion(
     processing: str = "",
     flags: Sequence[str] = (),
     suite: str | None = None,
+    site: Mapping[str, object] = NOTHING,
 ) -> tuple[int, bool]:
     """Store a motion, or find the stored one with the same samples.
 
@@ -63,8 +69,8 @@ def add_motion(
 
     Where it is there already, a stated earthquake replaces a guessed one together with all
     labels (recording, station, component, vertical or not, processing, flags); a guess replaces
-    nothing; what was stated before stays, and stating another earthquake or direction is
-    rejected.
+    nothing; what was stated before stays, and stating another earthquake, direction or site is
+    rejected. Missing values of its recording and earthquake are filled in.
 
     Args:
         motion: equally spaced samples [g].
@@ -77,12 +83,13 @@ def add_motion(
         processing: what was done to the samples, in words.
         flags: quality signs, such as ``event_guessed``.
         suite: suite to put the motion into; made when new.
+        site: columns of the recording by name: network, place, distances, Vs30, attributes.
 
     Returns:
         The motion's id, and True when it was not there before.
 
     Raises:
-        InputError: a motion from nodes; another earthquake or direction was stated before.
+        InputError: a motion from nodes; another earthquake, direction or site was stated before.
     """
     if motion.dt_s is None:
         raise InputError(
@@ -111,22 +118,41 @@ def add_motion(
         new = insert_if_new(connection, schema.motion, values)
         stored = _find(connection, motion)
         assert stored is not None
+        if new:
+            store_spectrum(connection, stored["id"], motion)
+            renew_recording_spectra(connection, labels["recording_id"])
     else:
         new = False
         if stored["guessed"] and not earthquake.guessed:
             labels["recording_id"] = recording_id_for(connection, *place)
             update_rows(connection, schema.motion, schema.motion.c.id == stored["id"], labels)
+            for recording_id in (stored["recording_id"], labels["recording_id"]):
+                renew_recording_spectra(connection, recording_id)
             delete_orphans(connection, stored["recording_id"])
         elif not earthquake.guessed:
             _reject_contradiction(motion, stored, earthquake, is_vertical)
+            earthquake_id_for(connection, earthquake, recording=recording)
+    (recording_id,) = connection.scalars(
+        select(schema.motion.c.recording_id).where(schema.motion.c.id == stored["id"])
+    )
+    complete_recording(connection, recording_id, site)
     if suite is not None:
         add_to_suite(connection, suite, stored["id"])
     return stored["id"], new
 
 
-def motion_rows(connection: Connection, *, suite: str | None = None) -> list[MotionRow]:
-    """Return the stored motions without their samples, by id."""
+def motion_rows(
+    connection: Connection, *, suite: str | None = None, where: str | None = None
+) -> list[MotionRow]:
+    """Return the stored motions without their samples, by id.
+
+    Args:
+        suite: only the motions of this suite.
+        where: only those that meet this condition.
+    """
     query = _row_query()
+    if where is not None:
+        query = query.where(condition_of_motions(where))
     if suite is not None:
         suite_id = require_suite(connection, suite)
         query = query.join(
@@ -180,16 +206,20 @@ def load_motion(connection: Connection, motion_id: int) -> GroundMotion:
             f"motion {motion_id}: the stored samples are damaged (their sha256 differs): restore "
             "the database from a backup; rbfrag db check lists what else is wrong"
         )
+    flags, applied = _listed(row, "flags"), _parameters(row)
+    is_corrected = True if "filter" in (applied or {}) else None
+    if "uncorrected" in flags:
+        is_corrected = False
     return GroundMotion(
         np.frombuffer(blob, dtype="<f8").astype(np.float64),
         row["dt_s"],
         **{name: row[name] for name in _LABELS},
         event=row["event_name"] or row["event_id"],
         remarks=tuple(_listed(row, "remarks")),
-        is_corrected=_is_corrected(row),
-        is_partial="partial" in _listed(row, "flags"),
+        is_corrected=is_corrected,
+        is_partial="partial" in flags,
         start_time=row["start_time"] and datetime.fromisoformat(row["start_time"]),
-        processing_applied=_parameters(row),
+        processing_applied=applied,
         source_sha256="" if row["processing_applied"] is None else row["source_sha256"],
     )
 
@@ -212,7 +242,9 @@ def same_source(connection: Connection, motion_id: int) -> list[int]:
 
 def measures_of(motion: GroundMotion) -> dict[str, float | None]:
     """Return the :data:`COMPUTED` measures of a motion, by column."""
-    values = {**asdict(motion.measures), **motion.spectral_accelerations}
+    values = {
+        **asdict(motion.measures), **motion.spectral_accelerations, "housner_m": motion.housner_m
+    }  # fmt: skip
     return {name: values[name] for name in COMPUTED}
 
 
@@ -280,12 +312,6 @@ def _measured(motion: GroundMotion) -> dict[str, Any]:
     }
 
 
-def _is_corrected(row: RowMapping) -> bool | None:
-    if "uncorrected" in _listed(row, "flags"):
-        return False
-    return True if "filter" in (_parameters(row) or {}) else None
-
-
 def _parameters(row: RowMapping) -> dict[str, object] | None:
     where = f"processing_applied of motion {row['id']}"
     parameters: dict[str, object] | None = stored_json(row["processing_applied"], dict, where)
@@ -304,6 +330,41 @@ def recording_id_for(connection: Connection, event: EarthquakeInfo, name: str, s
     insert_if_new(connection, schema.recording, values)
     row_id: int = connection.execute(select(schema.recording.c.id).filter_by(**values)).scalar_one()
     return row_id
+
+
+def complete_recording(
+    connection: Connection, recording_id: int, site: Mapping[str, object]
+) -> None:
+    """Fill in missing columns of a recording.
+
+    Args:
+        site: values by column; None and empty ones say nothing. Those of ``attributes`` are texts
+            by name.
+
+    Raises:
+        InputError: another value is stored; the message has both.
+    """
+    values = {name: value for name, value in site.items() if value not in (None, "", {})}
+    if not values:
+        return
+    table = schema.recording
+    row = connection.execute(select(table).where(table.c.id == recording_id)).mappings().one()
+    where = f"attributes of recording {recording_id}"
+    attributes = stored_json(row["attributes"], dict, where) or {}
+    stored = {**row, "attributes": attributes}
+    added = dict(cast("Mapping[str, str]", values.pop("attributes", {})))
+    for before, after in ((stored, values), (attributes, added)):
+        for name, value in after.items():
+            if before.get(name) not in (None, value):
+                raise InputError(
+                    f"recording {row['name']!r} has {name} {before[name]}, not {value}: correct "
+                    "the metadata"
+                )
+    changed = {name: value for name, value in values.items() if row[name] is None}
+    if not added.items() <= attributes.items():
+        changed["attributes"] = canonical_json({**attributes, **added})
+    if changed:
+        update_rows(connection, table, table.c.id == recording_id, changed)
 
 
 def delete_orphans(connection: Connection, recording_id: int) -> None:
@@ -342,9 +403,9 @@ def _row_query() -> Select[Any]:
         schema.earthquake.c.event_id,
         schema.earthquake.c.guessed.label("event_guessed"),
         schema.earthquake.c.name.label("event_name"),
-        schema.earthquake.c.magnitude,
+        *(schema.earthquake.c[name] for name in ("magnitude", "mechanism", "depth_km")),
         schema.recording.c.name.label("recording"),
-        schema.recording.c.station,
+        *(schema.recording.c[name] for name in (*_OF_RECORDING, "attributes")),
         *(schema.motion.c[name] for name in _OF_ROWS),
         schema.motion.c.processing_applied,
         schema.motion.c.samples_sha256.label("sha256"),
@@ -354,11 +415,16 @@ def _row_query() -> Select[Any]:
 
 def _motion_row(row: RowMapping) -> MotionRow:
     label = " ".join(part for part in (row["station"], row["component"]) if part)
-    names = ("event_id", "event_guessed", "magnitude", "recording", "station", "sha256", *_OF_ROWS)
+    names = (
+        "event_id", "event_guessed", "magnitude", "mechanism", "depth_km", "recording",
+        *_OF_RECORDING, "sha256", *_OF_ROWS,
+    )  # fmt: skip
+    where = f"attributes of the recording of motion {row['id']}"
     return MotionRow(
         name=label or f"{row['source_file']}#{row['trace_index']}",
         processing_applied=_parameters(row),
         flags=tuple(_listed(row, "flags")),
+        attributes=stored_json(row["attributes"], dict, where) or {},
         **{name: row[name] for name in names if name not in _NUMBERS},
         **{name: stored_number(row[name], f"{name} of motion {row['id']}") for name in _NUMBERS},
     )
@@ -393,6 +459,8 @@ def earthquake_id_for(connection: Connection, info: EarthquakeInfo, *, recording
         "name": storable(info.name),
         "magnitude": info.magnitude,
         "time": None if info.time is None else storable(info.time),
+        "mechanism": info.mechanism,
+        "depth_km": info.depth_km,
     }
     insert_if_new(connection, earthquake, {"event_id": event_id, "guessed": guessed, **columns})
     row = connection.execute(
@@ -400,7 +468,11 @@ def earthquake_id_for(connection: Connection, info: EarthquakeInfo, *, recording
             earthquake.c.event_id == event_id, earthquake.c.guessed.is_(guessed)
         )
     ).one()
-    missing = {key: value for key, value in columns.items() if value and not row._mapping[key]}
+    missing = {
+        key: value
+        for key, value in columns.items()
+        if value not in (None, "") and row._mapping[key] in (None, "")
+    }
     if missing:
         update_rows(connection, earthquake, earthquake.c.id == row.id, missing)
     return int(row.id)

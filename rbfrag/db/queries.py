@@ -9,13 +9,14 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from sqlalchemy import ColumnElement, Connection, RowMapping, Select, and_, case, func, select
+from sqlalchemy import ColumnElement, Connection, and_, case, func, select
 
-from rbfrag.db.engine import stated_revision
+from rbfrag.db.conditions import condition_of_combinations
+from rbfrag.db.engine import stored_revision
 from rbfrag.db.ledger import last_sound
 from rbfrag.db.models import load_model
 from rbfrag.db.motions import require_suite
-from rbfrag.db.rows import IMPORTED, CombinationTable, Vertical
+from rbfrag.db.rows import IMPORTED, CombinationTable, Vertical, stored_json, stored_number
 from rbfrag.db.schema import (
     combination,
     earthquake,
@@ -26,7 +27,6 @@ from rbfrag.db.schema import (
     suite_motion,
 )
 from rbfrag.db.schema import suite as suite_table
-from rbfrag.db.stored_json import stored_json, stored_number
 from rbfrag.errors import DatabaseError, InputError, UnknownModelError
 from rbfrag.motions.quality import PGD_IN_DOUBT, STRUCTURE
 from rbfrag.results.numbers import count_of
@@ -36,6 +36,9 @@ from rbfrag.vocabulary.quantities import MEASURES, QUANTITIES
 
 _MEASURES = tuple(name for name in MEASURES if QUANTITIES[name].stored)
 _OF_TABLE = {*_MEASURES} & {*CombinationTable.__dataclass_fields__}
+_METADATA = (
+    earthquake.c.mechanism, recording.c.rjb_km, recording.c.rrup_km, recording.c.vs30_m_s
+)  # fmt: skip
 _ON_STRUCTURE = motion.c.flags.contains(f'"{STRUCTURE}"')
 
 
@@ -49,6 +52,8 @@ class DatabaseInfo(Result):
         default_model: name of the model of toppling that answers when none is named; None
             without one, or where a model is damaged.
         last_sound: when ``rbfrag db check`` last found nothing, UTC; None for never.
+        metadata: number of earthquakes with a mechanism and of recordings with R_JB and Vs30, by
+            column.
     """
 
     revision: str
@@ -58,6 +63,7 @@ class DatabaseInfo(Result):
     numerics_versions: tuple[str, ...]
     default_model: str | None
     last_sound: str | None
+    metadata: dict[str, int]
     warnings: tuple[str, ...] = ()
 
     def sentences(self) -> Iterator[str]:
@@ -77,6 +83,9 @@ class DatabaseInfo(Result):
         yield TextLine("Solver", ", ".join(self.numerics_versions) or "none")
         yield TextLine("Default", self.default_model or "none")
         yield TextLine("Checked", self.last_sound or "never")
+        yield TextLine(
+            "Metadata", ", ".join(f"{name} of {number:,}" for name, number in self.metadata.items())
+        )
 
     def tables(self, *, verbose: bool = False) -> Iterator[TextTable]:  # noqa: ARG002
         """Yield the number of rows by table, and of combinations by status."""
@@ -101,7 +110,7 @@ class SuiteCount:
         combinations: number of stored combinations, of all versions of the numerics.
         found: of these, those with a critical value.
         below_limit: of these, those in which nothing fails down to the search limit.
-        vertical: of these, those with a vertical motion beside the horizontal one.
+        vertical: of these, those with a vertical motion in addition to the horizontal one.
     """
 
     suite: str | None
@@ -147,6 +156,7 @@ def combination_table(
     numerics_version: str | None = None,
     doubtful_pgd: bool = False,
     include_structures: bool = False,
+    where: str | None = None,
 ) -> CombinationTable:
     """Return the combinations of a kind, with critical values and the intensity measures of their
     motions.
@@ -163,19 +173,38 @@ def combination_table(
         Columns of equal length, sorted by natural key: equal databases give equal tables.
 
     Raises:
-        InputError: there is no such suite; `vertical` is none of the three.
+        InputError: there is no such suite; `vertical` is not one of the three; a condition that is
+            not supported.
     """
     if vertical not in ("without", "with", "both"):
         raise InputError(f"vertical must be without, with or both, not {vertical!r}")
-    query = _combination_query().where(
-        combination.c.kind == kind,
-        combination.c.linear.is_(False),
+    columns = (
+        "id", "natural_key", "motion_id", "vertical_motion_id", "polarity", "p2", "block",
+        "yield_g", "settings", "numerics_version", "status", "search_limit", "kr_over_pga",
+        "upper", "kr", "y_m_s",
+    )  # fmt: skip
+    query = (
+        select(
+            *(combination.c[name] for name in columns),
+            *(motion.c[name] for name in (*_MEASURES, "flags") if name in motion.c),
+            earthquake.c.event_id,
+            earthquake.c.guessed,
+            earthquake.c.magnitude,
+        )
+        .select_from(
+            combination.join(motion, motion.c.id == combination.c.motion_id)
+            .join(recording)
+            .join(earthquake)
+        )
+        .where(combination.c.kind == kind, combination.c.linear.is_(False))
     )
     if vertical != "both":
         column = combination.c.vertical_motion_id
         query = query.where(column.is_(None) if vertical == "without" else column.is_not(None))
     if not include_structures:
         query = query.where(~_ON_STRUCTURE)
+    if where is not None:
+        query = query.where(condition_of_combinations(where))
     if suite is not None:
         suite_id = require_suite(connection, suite)
         query = query.join(
@@ -185,7 +214,12 @@ def combination_table(
     version = combination.c.numerics_version
     if numerics_version is None:
         versions = connection.scalars(query.with_only_columns(version).distinct())
-        numerics_version = max(versions, key=_age, default=NUMERICS_VERSION)
+        # the newest; imported values only where there are no others
+        numerics_version = max(
+            versions,
+            key=lambda version: (version != IMPORTED, len(version), version),
+            default=NUMERICS_VERSION,
+        )
     query = query.where(version == numerics_version)
     # without a search limit blocks were followed to their end, whatever a search before saw of them
     order = (combination.c.search_limit.nulls_first(), combination.c.natural_key)
@@ -216,7 +250,10 @@ def combination_table(
 
     pgd_m = floats("pgd_m")
     if not doubtful_pgd:
-        pgd_m[np.array([_pgd_in_doubt(row) for row in selected], dtype=np.bool_)] = np.nan
+        for number, row in enumerate(selected):
+            flags = stored_json(row["flags"], list, f"flags of motion {row['motion_id']}")
+            if not PGD_IN_DOUBT.isdisjoint(flags):
+                pgd_m[number] = np.nan
     numbers = (
         "p2", "yield_g", "search_limit", "kr_over_pga", "upper", "kr", "y_m_s",
         *(_OF_TABLE - {"pgd_m"}),
@@ -319,7 +356,7 @@ def database_info(connection: Connection) -> DatabaseInfo:
     except (DatabaseError, UnknownModelError):  # none, or one that is damaged
         default_model = None
     return DatabaseInfo(
-        revision=stated_revision(connection) or "",
+        revision=stored_revision(connection) or "",
         dialect=connection.dialect.name,
         rows={
             name: int(connection.scalar(select(func.count()).select_from(table)) or 0)
@@ -331,6 +368,10 @@ def database_info(connection: Connection) -> DatabaseInfo:
         numerics_versions=tuple(sorted(connection.scalars(versions))),
         default_model=default_model,
         last_sound=last_sound(connection),
+        metadata={
+            column.name: int(connection.scalar(select(func.count(column))) or 0)
+            for column in _METADATA
+        },
     )
 
 
@@ -380,33 +421,3 @@ def suite_counts(connection: Connection) -> SuiteCounts:
     counts += [SuiteCount(suite, None, motions[suite], 0, 0, 0, 0) for suite in without]
     counts.sort(key=lambda c: (c.suite is None, c.suite or "", c.kind or ""))
     return SuiteCounts(tuple(counts))
-
-
-def _pgd_in_doubt(row: RowMapping) -> bool:
-    where = f"flags of motion {row['motion_id']}"
-    return not PGD_IN_DOUBT.isdisjoint(stored_json(row["flags"], list, where))
-
-
-def _age(numerics_version: str) -> tuple[bool, int, str]:
-    """Return a sort key of numerics versions, the newest last; imported values come first."""
-    return numerics_version != IMPORTED, len(numerics_version), numerics_version
-
-
-def _combination_query() -> Select[Any]:
-    columns = (
-        "id", "natural_key", "motion_id", "vertical_motion_id", "polarity", "p2", "block",
-        "yield_g", "settings", "numerics_version", "status", "search_limit", "kr_over_pga",
-        "upper", "kr", "y_m_s",
-    )  # fmt: skip
-    of_motion = (*(name for name in _MEASURES if name in motion.c), "flags")
-    return select(
-        *(combination.c[name] for name in columns),
-        *(motion.c[name] for name in of_motion),
-        earthquake.c.event_id,
-        earthquake.c.guessed,
-        earthquake.c.magnitude,
-    ).select_from(
-        combination.join(motion, motion.c.id == combination.c.motion_id)
-        .join(recording)
-        .join(earthquake)
-    )

@@ -1,13 +1,16 @@
-"""Rows of the database as frozen dataclasses.
+"""Rows of the database as frozen dataclasses, and the values of their JSON and number columns.
 
 This module loads neither SQLAlchemy nor numpy, because `rbfrag predict` needs it.
 """
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple, TypedDict
+
+from rbfrag.errors import DatabaseError
 
 Vertical = Literal["without", "with", "both"]
 
@@ -23,6 +26,8 @@ class Selection(TypedDict, total=False):
         doubtful_pgd: True to return the PGD of motions that are flagged for an implausible
             final velocity or displacement; by default it is NaN, so that no fit reads it.
         include_structures: True to read motions of sensors on structures, too.
+        where: condition over columns of the view `outcome`, as
+            :func:`rbfrag.db.conditions.parsed_condition` reads it.
     """
 
     suite: str | None
@@ -30,6 +35,7 @@ class Selection(TypedDict, total=False):
     rotation_deg: float | None
     doubtful_pgd: bool
     include_structures: bool
+    where: str | None
 
 
 if TYPE_CHECKING:
@@ -47,6 +53,8 @@ class EarthquakeInfo:
         magnitude: magnitude as the source gives it (scale not harmonised), if known.
         time: origin time or year as text, if known.
         guessed: True when the event was read off a file header instead of stated by metadata.
+        mechanism: fault mechanism, if known.
+        depth_km: depth of the hypocentre [km], if known.
     """
 
     event_id: str
@@ -54,6 +62,8 @@ class EarthquakeInfo:
     magnitude: float | None = None
     time: str | None = None
     guessed: bool = True
+    mechanism: str | None = None
+    depth_km: float | None = None
 
 
 @dataclass(frozen=True)
@@ -65,8 +75,18 @@ class MotionRow:
     event_id: str
     event_guessed: bool
     magnitude: float | None
+    mechanism: str | None
+    depth_km: float | None
     recording: str
     station: str
+    network: str | None
+    lat: float | None
+    lon: float | None
+    rjb_km: float | None
+    rrup_km: float | None
+    repi_km: float | None
+    vs30_m_s: float | None
+    attributes: Mapping[str, str]
     component: str
     orientation_deg: float | None
     is_vertical: bool
@@ -84,6 +104,8 @@ class MotionRow:
     cav_m_s: float | None
     arias_m_s: float | None
     d5_95_s: float | None
+    d5_75_s: float | None
+    housner_m: float | None
     final_velocity_m_s: float
     final_displacement_m: float
     source_file: str
@@ -169,3 +191,39 @@ class CombinationTable:
         }
         measures = {name: column[chosen] for name, column in self.measures.items()}
         return CombinationTable(**columns, measures=measures)
+
+
+def stored_json(text: Any, kind: type, where: str) -> Any:
+    """Return the value of a JSON column.
+
+    Args:
+        text: what the column holds; None (nothing) gives None.
+        kind: list or dict, which it must be.
+        where: table, row and column, for the message.
+
+    Raises:
+        DatabaseError: it is no JSON, or something else than a `kind`.
+    """
+    if text is None:
+        return None
+    try:
+        value = json.loads(text)
+    except (ValueError, TypeError, RecursionError) as error:
+        raise _damaged(where, str(error)) from None
+    if not isinstance(value, kind):
+        raise _damaged(where, f"no JSON {'list' if kind is list else 'object'}")
+    return value
+
+
+def stored_number(value: Any, where: str) -> Any:
+    """Return a number of a column, or None; SQLite accepts text in number columns."""
+    if value is None or isinstance(value, int | float):
+        return value
+    raise _damaged(where, f"{value!r} is not a number")
+
+
+def _damaged(where: str, reason: str) -> DatabaseError:
+    return DatabaseError(
+        f"{where} of the database is damaged ({reason}): run  rbfrag db check  and restore the "
+        "database from a backup"
+    )

@@ -1,8 +1,8 @@
 """Tables of the database. Units are in the column names; natural unique keys contain no NULL.
 
-New databases are made from these definitions, and migrations bring older ones to them. What each
-table and column means stands beside it, for :mod:`rbfrag.db.data_dictionary`. Each row carries a
-digest of its values, which :mod:`rbfrag.db.insert` writes.
+New databases are made from these definitions, and migrations upgrade older ones to them. The
+meaning of each table and column is given with it, for :mod:`rbfrag.db.data_dictionary`. Each row
+has a digest of its values, which :mod:`rbfrag.db.insert` writes.
 """
 
 from __future__ import annotations
@@ -29,8 +29,8 @@ from sqlalchemy import (
 )
 from sqlalchemy.schema import SchemaItem
 
-from rbfrag.motions.response_spectrum import PERIODS_S
-from rbfrag.vocabulary.quantities import QUANTITIES
+from rbfrag.motions.response_spectrum import PERIODS_S, SPECTRUM_PERIODS_S
+from rbfrag.vocabulary.quantities import MECHANISMS, QUANTITIES
 
 metadata = MetaData(
     naming_convention={
@@ -42,11 +42,17 @@ metadata = MetaData(
     }
 )
 
-LATER_MEASURES = (*PERIODS_S, "cav_m_s", "arias_m_s", "d5_95_s")
-"""Intensity measures since schema 0005; missing where a database was upgraded without samples."""
+LATER_MEASURES = (*PERIODS_S, "cav_m_s", "arias_m_s", "d5_95_s", "d5_75_s", "housner_m")
+"""Intensity measures that came later; missing where a database was upgraded without samples."""
 
 MEASURES = ("pga_g", "pgv_m_s", "pgd_m", "tm_s", *LATER_MEASURES)
 """Intensity measures of a motion, in the order of their columns."""
+
+ORDINATES = tuple(f"sa_{n:03}" for n in range(1, len(SPECTRUM_PERIODS_S) + 1))
+"""Columns of a response spectrum, in the order of its periods."""
+
+SITE_COLUMNS = ("lat", "lon", "rjb_km", "rrup_km", "repi_km", "vs30_m_s")
+"""Columns of numbers of a recording: the place of its station, its distances and its ground."""
 
 POLARITY = "polarity IN ('forward', 'reverse')"
 KIND = "kind <> ''"
@@ -105,6 +111,14 @@ def _row_number() -> Column[Any]:
     return _column("id", Integer, "row number, of this database alone", primary_key=True)
 
 
+def _ordinates(suffix: str) -> tuple[Column[Any], ...]:
+    """Return the columns of a response spectrum."""
+    return tuple(
+        _column(name, Double, f"SA({period_s:g} s){suffix}", "g")
+        for name, period_s in zip(ORDINATES, SPECTRUM_PERIODS_S, strict=True)
+    )
+
+
 def _shaken() -> tuple[Column[Any], ...]:
     """Return the columns of the excitation and the kind of a simulated block."""
     return (
@@ -133,9 +147,13 @@ earthquake = _table(
     _column("name", Text, "name for people; may be empty"),
     _quantity("magnitude", nullable=True),
     _optional("time", Text, "origin time, or the year, as text"),
+    _optional("mechanism", Text, QUANTITIES["mechanism"].stored),
+    _quantity("depth_km", nullable=True),
     UniqueConstraint("event_id", "guessed"),
     CheckConstraint("event_id <> ''", name="event_id"),
     CheckConstraint("magnitude > -5 AND magnitude < 11", name="magnitude"),
+    CheckConstraint(f"mechanism IN {MECHANISMS}", name="mechanism"),
+    CheckConstraint("depth_km >= -10 AND depth_km <= 800", name="depth_km"),
 )
 
 recording = _table(
@@ -145,8 +163,17 @@ recording = _table(
     _reference("earthquake_id", "earthquake.id", "RESTRICT", "the earthquake"),
     _column("name", Text, "name that all components of the recording share"),
     _column("station", Text, "station code or name; may be empty"),
+    _optional("network", Text, "code or name of the network"),
+    *(_quantity(name, nullable=True) for name in SITE_COLUMNS),
+    _optional(
+        "attributes", Text, "JSON object: text by name of the further columns of the metadata"
+    ),
     UniqueConstraint("earthquake_id", "name", "station"),
     CheckConstraint("name <> ''", name="name"),
+    CheckConstraint("lat >= -90 AND lat <= 90", name="lat"),
+    CheckConstraint("lon >= -180 AND lon <= 360", name="lon"),
+    *(CheckConstraint(f"{name} >= 0", name=name) for name in SITE_COLUMNS[2:5]),
+    CheckConstraint("vs30_m_s > 0", name="vs30_m_s"),
 )
 
 motion = _table(
@@ -199,6 +226,8 @@ motion = _table(
         name="spectrum",
     ),
     CheckConstraint("cav_m_s >= 0 AND arias_m_s >= 0 AND d5_95_s >= 0", name="energy"),
+    CheckConstraint("d5_75_s >= 0", name="d5_75_s"),
+    CheckConstraint("housner_m >= 0", name="housner_m"),
     CheckConstraint("length(samples_sha256) = 64", name="samples_sha256"),
     CheckConstraint("length(source_sha256) = 64", name="source_sha256"),
     Index(None, "recording_id"),
@@ -221,6 +250,33 @@ suite_motion = _table(
     _reference("motion_id", "motion.id", "CASCADE", "the motion"),
     PrimaryKeyConstraint("suite_id", "motion_id"),
     Index(None, "motion_id"),
+    sqlite_with_rowid=False,
+)
+
+motion_spectrum = _table(
+    "motion_spectrum",
+    "The response spectrum of motions: pseudo-spectral acceleration, 5 % damping.",
+    _reference("motion_id", "motion.id", "CASCADE", "the motion"),
+    *_ordinates(""),
+    PrimaryKeyConstraint("motion_id"),
+    CheckConstraint("sa_001 >= 0", name="ranges"),
+    sqlite_with_rowid=False,
+)
+
+recording_spectrum = _table(
+    "recording_spectrum",
+    "RotD50 and RotD100 of recordings: percentiles of the peaks of the two horizontals, rotated "
+    "into 180 directions (Boore 2010).",
+    _reference("motion_id", "motion.id", "CASCADE", "a horizontal motion of the recording"),
+    _reference("other_motion_id", "motion.id", "CASCADE", "the horizontal perpendicular to it"),
+    _column("percentile", Integer, "50 for RotD50, 100 for RotD100"),
+    _column("pga_g", Double, "percentile of PGA over the directions", "g"),
+    _column("pgv_m_s", Double, "percentile of PGV over the directions", "m/s"),
+    *_ordinates(", percentile over the directions"),
+    PrimaryKeyConstraint("motion_id", "other_motion_id", "percentile"),
+    CheckConstraint("percentile IN (50, 100)", name="percentile"),
+    CheckConstraint("pga_g >= 0 AND pgv_m_s >= 0 AND sa_001 >= 0", name="ranges"),
+    Index(None, "other_motion_id"),
     sqlite_with_rowid=False,
 )
 
@@ -382,7 +438,7 @@ simulation = _table(
         "grid",
         Integer,
         "number of the block in the grid of its kind, which does not depend on outcomes; missing "
-        "for a block beside it",
+        "for a block outside it",
     ),
     _optional(
         "sensitive",
@@ -546,7 +602,7 @@ fragility_model = _table(
     ),
 )
 
-# apart from the others: it is of no content, and databases of schema 0008 have none
+# apart from the others: it describes them, and is not content itself
 ledger = Table(
     "ledger",
     MetaData(naming_convention=metadata.naming_convention),

@@ -8,11 +8,10 @@ from typing import Any, Literal, NamedTuple
 
 from sqlalchemy import Connection, select
 
-from rbfrag.db.digest import NOT_DIGESTED
 from rbfrag.db.insert import insert_rows, rows_of_keys
-from rbfrag.db.keys import canonical_json
+from rbfrag.db.keys import NOT_DIGESTED, canonical_json
+from rbfrag.db.rows import stored_json
 from rbfrag.db.schema import campaign, earthquake, motion, recording, shock_pair
-from rbfrag.db.stored_json import stored_json
 from rbfrag.motions.polarity import Polarity
 
 Pairing = Literal["station", "drawn"]
@@ -94,15 +93,18 @@ def insert_shock_pairs(
     connection: Connection, campaign_id: int, records: Sequence[ShockPairRecord]
 ) -> None:
     """Store blocks under two motions; existing keys are skipped."""
+    rows = []
     # in one order: two campaigns on one server then wait for each other, never both at once
-    ordered = sorted(records, key=lambda record: record.natural_key)
-    insert_rows(connection, shock_pair, COLUMNS, [_row(campaign_id, record) for record in ordered])
-
-
-def known_shock_pairs(connection: Connection, keys: Iterable[str]) -> set[str]:
-    """Return the natural keys that are stored."""
-    column = shock_pair.c.natural_key
-    return {key for (key,) in rows_of_keys(connection, select(column), column, keys)}
+    for record in sorted(records, key=lambda record: record.natural_key):
+        ends = {
+            f"{part}_{name}": value
+            for part in PARTS
+            for name, value in getattr(record, part)._asdict().items()
+        }
+        block = canonical_json(record.block)
+        values = {**vars(record), **ends, "campaign_id": campaign_id, "block": block}
+        rows.append(tuple(values[name] for name in COLUMNS))
+    insert_rows(connection, shock_pair, COLUMNS, rows)
 
 
 def pair_keys_with_samples(connection: Connection, *, numerics_version: str) -> list[str]:
@@ -155,18 +157,3 @@ def stored_shock_pairs(connection: Connection, keys: Iterable[str]) -> list[Stor
         of_second = row["event_id"], row["pga_g"]
         pairs.append(StoredShockPair(row["id"], settings.get("made_on"), *of_second, record))
     return sorted(pairs, key=lambda pair: pair.record.natural_key)
-
-
-def _row(campaign_id: int, record: ShockPairRecord) -> tuple[object, ...]:
-    ends = {
-        f"{part}_{name}": value
-        for part in PARTS
-        for name, value in getattr(record, part)._asdict().items()
-    }
-    values = {
-        **{name: value for name, value in vars(record).items() if name not in PARTS},
-        **ends,
-        "campaign_id": campaign_id,
-        "block": canonical_json(record.block),
-    }
-    return tuple(values[name] for name in COLUMNS)

@@ -82,7 +82,7 @@ def connect_sqlite(
     A read-only connection still opens the file for writing where it may and forbids writes
     by `query_only`: only so does SQLite tidy up its -wal and -shm files behind the last
     reader. Where file or folder cannot be written, a file in WAL mode can only be read as
-    `immutable`, which is safe as long as no -wal file with content lies beside it.
+    `immutable`, which is safe as long as no -wal file with content lies next to it.
 
     Args:
         check_same_thread: as for :func:`sqlite3.connect`.
@@ -94,7 +94,12 @@ def connect_sqlite(
         except sqlite3.Error as error:
             if not read_only or _primary_code(error) not in (_READONLY, _CANTOPEN):
                 raise
-            _reject_unreadable_log(path)
+            log = path.with_name(path.name + "-wal")
+            if log.exists() and log.stat().st_size > 0:
+                raise DatabaseReadOnlyError(
+                    f"{path}: newer rows are still in {log.name}, which is not usable in a "
+                    "read-only folder: copy both files to another folder"
+                ) from error
             return _connect(path, "mode=ro&immutable=1", True, check_same_thread)
     except (sqlite3.Error, UnicodeDecodeError) as error:
         raise explained_sqlite_error(error, path) from error
@@ -121,16 +126,7 @@ def _connect(path: Path, mode: str, read_only: bool, check_same_thread: bool) ->
     return connection
 
 
-def _reject_unreadable_log(path: Path) -> None:
-    log = path.with_name(path.name + "-wal")
-    if log.exists() and log.stat().st_size > 0:
-        raise DatabaseReadOnlyError(
-            f"{path}: newer rows are still in {log.name}, which is not usable in a read-only "
-            "folder: copy both files to another folder"
-        )
-
-
-def check_sqlite_database(connection: sqlite3.Connection, path: Path, *, read_only: bool) -> None:
+def check_sqlite_database(connection: sqlite3.Connection, path: Path) -> None:
     """Check from inside that an SQLite file is an rbfrag database of this schema."""
     try:
         (application,) = connection.execute("PRAGMA application_id").fetchone()
@@ -154,7 +150,7 @@ def check_sqlite_database(connection: sqlite3.Connection, path: Path, *, read_on
         raise NotADatabaseError(
             f"{path} is marked as an rbfrag database but has no schema: restore it from a backup"
         )
-    check_revision(revision, str(path), read_only=read_only)
+    check_revision(revision, str(path))
 
 
 def explained_sqlite_error(

@@ -16,6 +16,7 @@ from rbfrag.db.rows import MotionRow
 from rbfrag.db.schema import motion, recording
 from rbfrag.errors import InputError
 from rbfrag.motions.direction import is_downward_name, lead_in_of, why_not_together
+from rbfrag.motions.rotation import treatment
 
 
 @dataclass(frozen=True)
@@ -72,17 +73,12 @@ def vertical_pair(connection: Connection, motion_id: int) -> VerticalPair:
     )
 
 
-@dataclass(frozen=True)
-class MixedRecording:
-    """Recording whose components differ in sampling interval, `dt_s` increasing."""
+def recordings_of_mixed_dt(connection: Connection) -> list[tuple[str, list[float], list[int]]]:
+    """Return the recordings whose components differ in sampling interval.
 
-    name: str
-    dt_s: tuple[float, ...]
-    motion_ids: tuple[int, ...]
-
-
-def recordings_of_mixed_dt(connection: Connection) -> list[MixedRecording]:
-    """Return every recording whose components differ in sampling interval."""
+    Returns:
+        Name, sampling intervals [s] in increasing order, and motion ids of each.
+    """
     mixed = (
         select(motion.c.recording_id)
         .group_by(motion.c.recording_id)
@@ -98,11 +94,7 @@ def recordings_of_mixed_dt(connection: Connection) -> list[MixedRecording]:
     for row in connection.execute(query):
         by_recording[row.id].append(row)
     return [
-        MixedRecording(
-            name=rows[0].name,
-            dt_s=tuple(sorted({row.dt_s for row in rows})),
-            motion_ids=tuple(row.motion_id for row in rows),
-        )
+        (rows[0].name, sorted({row.dt_s for row in rows}), [row.motion_id for row in rows])
         for rows in by_recording.values()
     ]
 
@@ -113,7 +105,8 @@ def _pair(row: MotionRow, verticals: Sequence[MotionRow]) -> VerticalPair:
             row.id, reason=f"no vertical motion of recording {row.recording!r} is stored"
         )
     # of a recording stored raw and processed, the one that was treated like the horizontal
-    alike = [v for v in verticals if _treatment(v) == _treatment(row)] or list(verticals)
+    processing = treatment(row.processing_applied)
+    alike = [v for v in verticals if treatment(v.processing_applied) == processing] or [*verticals]
     if len(alike) > 1:
         ids = ", ".join(str(vertical.id) for vertical in alike)
         return VerticalPair(
@@ -150,12 +143,6 @@ def _pair(row: MotionRow, verticals: Sequence[MotionRow]) -> VerticalPair:
         vertical_sha256=vertical.sha256,
         remark=remark,
     )
-
-
-def _treatment(row: MotionRow) -> object:
-    applied = dict(row.processing_applied or {})
-    applied.pop("turned_upward", None)
-    return applied
 
 
 def _time(row: MotionRow) -> datetime | None:

@@ -1,4 +1,4 @@
-"""Tables of blocks as read by the commands: the blocks, and the rejected rows."""
+"""Tables of blocks as read by the commands: the blocks, the rejected rows, and draws of a block."""
 
 from __future__ import annotations
 
@@ -15,12 +15,15 @@ from numpy.typing import NDArray
 from rbfrag.errors import InputError, MissingExtraError
 from rbfrag.exchange.block_table import TEXTS, opened_table
 from rbfrag.files import as_path
-from rbfrag.fragility.invalid_rows import describe_invalid, reject
+from rbfrag.fragility.method import TOPPLING_BLOCK
+from rbfrag.fragility.model_selection import block_of
+from rbfrag.fragility.validation import describe_invalid, in_list, reject, reject_elements
+from rbfrag.question.classify import classify_block, has_shape, kinds_by_numbers, numbers_in
 from rbfrag.question.classify_arrays import classify_blocks
-from rbfrag.question.predict_arrays import block_reasons_of
-from rbfrag.question.question import is_wet, without_water
+from rbfrag.question.drained_bound import is_wet, without_water
+from rbfrag.question.predict_arrays import block_reasons_of, blocks_of_arrays
 from rbfrag.question.shape_validation import OF_A_SHAPE, PLANE_TEXTS
-from rbfrag.results.diagnostic import diagnostics
+from rbfrag.results.diagnostic import Diagnostic, diagnostics
 from rbfrag.solver.kinds import KINDS, facts_of
 from rbfrag.vocabulary.quantities import BLOCK, BY_ROW, NUMBERS, column_of
 
@@ -268,7 +271,21 @@ def read_blocks(
         for i in np.flatnonzero((reasons == "") & (columns["kind"] != answer_kind)).tolist():
             row_kind = columns["kind"][i]
             reasons[i] = f"the block's kind is {row_kind}, and the answer is for kind {answer_kind}"
-    _reject_columns(columns, reasons)
+
+    def reject_rows(wrong: NDArray[np.bool_], text: str, *names: str) -> None:
+        for i in np.flatnonzero(wrong & (reasons == "")).tolist():
+            reasons[i] = text.format(*(columns[name][i] for name in names))
+
+    if "lon" in columns:
+        on_map = (np.abs(columns["lon"]) <= 180.0) & (np.abs(columns["lat"]) <= 90.0)
+        reject_rows(~on_map, "lon = {:g}, lat = {:g} is no place on the map", *PLACE)
+    for field in PORTFOLIO:
+        if field in columns:
+            wrong = (columns[field] < 0.0) | (columns[field] == np.inf)
+            reject_rows(wrong, field + " = {:g}: give a number not below zero", field)
+    if (count := columns.get("count")) is not None:
+        hint = "give the number of like blocks, a whole number from 1 on, or a weight"
+        reject_rows((count < 1.0) | (count != np.rint(count)), f"count = {{:g}}: {hint}", "count")
     for i, fault in faults.items():
         reasons[i] = fault
     used = {*blocks.read, *TEXTS, *PLACE, *PORTFOLIO, *reads, *of_place}
@@ -316,25 +333,95 @@ def _place_on_map(columns: dict[str, NDArray[Any]], crs: str | None, source: str
             ) from None
 
 
-def _reject_columns(columns: Columns, reasons: NDArray[np.object_]) -> None:
-    """Enter the reasons of rows whose position, count, weight or loss is invalid."""
+def collect_blocks(
+    inputs: Mapping[str, Any],
+    blocks: Blocks | None,
+    *,
+    reads: Sequence[str] = (),
+    one_kind: bool = True,
+) -> BlockRows:
+    """Return the blocks of a question, given by fields or as a table.
 
-    def say(wrong: NDArray[np.bool_], text: str, *names: str) -> None:
-        for i in np.flatnonzero(wrong & (reasons == "")).tolist():
-            reasons[i] = text.format(*(columns[name][i] for name in names))
+    Raises:
+        InputError: blocks given in no way or in two, or none that waits for an earthquake.
+    """
+    fields = dict(inputs)
+    kind = fields.pop("kind", None)
+    if blocks is not None:
+        if fields:
+            raise InputError(f"blocks describes the blocks: omit {' and '.join(fields)}")
+        return read_blocks(blocks, kind, reads=reads, one_kind=one_kind)
+    if not has_shape(fields) and not kinds_by_numbers(fields):
+        missing = next((name for name in TOPPLING_BLOCK.names if name not in fields), "p2")
+        raise InputError(f"{missing} is missing: give p2 and kr, or a table of blocks")
+    if {"block", "back_fracture"} & {*fields}:
+        described = classify_block(fields, kind)
+        (group,) = described.groups
+        rows = collect_blocks({**group.numbers, "kind": group.kind}, None, reads=reads)
+        return replace(rows, remarks=described.remarks)
+    reasons = block_reasons_of(*blocks_of_arrays(inputs))
+    reject_elements(reasons, fields=BLOCK)
+    try:
+        arrays = np.broadcast_arrays(*map(np.atleast_1d, fields.values()))
+    except ValueError:
+        raise InputError(f"{', '.join(fields)} differ in length") from None
+    columns = {column_of(name): array for name, array in zip(fields, arrays, strict=True)}
+    return read_blocks(columns, kind, reads=reads, one_kind=one_kind)
 
-    if "lon" in columns:
-        on_map = (np.abs(columns["lon"]) <= 180.0) & (np.abs(columns["lat"]) <= 90.0)
-        say(~on_map, "lon = {:g}, lat = {:g} is no place on the map", *PLACE)
-    for name in PORTFOLIO:
-        if name in columns:
-            values = columns[name]
-            say(
-                (values < 0.0) | (values == np.inf),
-                name + " = {:g}: give a number not below zero",
-                name,
-            )
-    if "count" in columns:
-        values = columns["count"]
-        hint = "give the number of like blocks, a whole number from 1 on, or a weight"
-        say((values < 1.0) | (values != np.rint(values)), f"count = {{:g}}: {hint}", "count")
+
+def read_by_models(rows: BlockRows) -> tuple[str, dict[str, Any], tuple[str, ...]]:
+    """Return the kind of blocks of one kind, the inputs of its models, and the warnings."""
+    kind = str(rows.blocks["kind"][0])
+    numbers = numbers_in(rows.blocks)
+    sigmas = [name for name in numbers if name.endswith("_sigma")]
+    fields = {n: v for n, v in numbers.items() if n not in sigmas and not np.isnan(v).all()}
+    block = block_of(fields, kind)
+    used_fields = {n: fields[n] for n in fields if n in (*block.names, *block.options)}
+    ignored = tuple(name for name in sigmas if np.nan_to_num(numbers[name]).any())
+    if not ignored:
+        return kind, used_fields, ()
+    text = (
+        f"{' and '.join(ignored)} of the blocks are not integrated here: each block is assumed to "
+        "be its median (predict, survival and losses integrate)"
+    )
+    return kind, used_fields, (Diagnostic(text, "medians_assumed", fields=ignored),)
+
+
+FloatArray = NDArray[np.float64]
+
+
+def read_draws(path: str | os.PathLike[str]) -> tuple[dict[str, FloatArray], FloatArray]:
+    """Return the draws of one block by the names of :func:`rbfrag.predict`, and their weights.
+
+    Args:
+        path: table of blocks, ``.csv`` or ``.parquet``; a column ``weight`` is read if there is
+            one. Columns that are empty throughout are left out.
+
+    Raises:
+        InputError: the file cannot be read, describes no block, or weights that are none.
+        MissingExtraError: a Parquet file without pyarrow.
+    """
+    fields = [name for name in BLOCK if not name.endswith("_sigma")]
+    with opened_table(path, (*fields, "weight"), ()) as table:
+        columns, faults, lines = table.read_all()
+    if faults:
+        row_names = [f"{table.file.word} {lines[i]}" for i in sorted(faults)]
+        raise InputError(f"{path}, {in_list(row_names, (faults[i] for i in sorted(faults)))}")
+    weight = columns.pop("weight", None)
+    drawn = {name: values for name, values in columns.items() if not np.isnan(values).all()}
+    if not drawn:
+        raise InputError(
+            f"{path}: no block parameters: a table of draws must have p2_1_s2 and kr, or the "
+            "columns of another kind"
+        )
+    size = next(iter(drawn.values())).size
+    if has_shape(drawn):
+        with table.named():
+            blocks = classify_blocks(drawn, size, rows=True)
+        for group in (*blocks.rejected, *blocks.unstable):
+            raise InputError(f"{path}: draw {group.indices[0] + 1}: {group.texts()[0]}")
+        if len(blocks.groups) > 1:
+            kinds = " and ".join(str(group.kind) for group in blocks.groups)
+            raise InputError(f"{path}: all draws of a block must have one kind, not {kinds}")
+        drawn = {n: np.broadcast_to(v, (size,)) for n, v in blocks.groups[0].numbers.items()}
+    return drawn, np.ones(size) if weight is None else weight

@@ -1,20 +1,23 @@
-"""Tables of blocks: meaning of the columns, and invalid cells by row."""
+"""Tables of blocks: meaning of the columns, invalid cells by row, and a template to fill in."""
 
 from __future__ import annotations
 
 import os
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rbfrag.errors import InputError, checked_name
-from rbfrag.exchange.excel_text import as_written
-from rbfrag.exchange.tables.files import open_table
+from rbfrag.exchange.tables.csv_file import as_written
+from rbfrag.exchange.tables.files import open_table, write_block_table
 from rbfrag.exchange.tables.parts import Parts, TableFile, TablePart, cells_of
+from rbfrag.exchange.tables.workbook import openpyxl
+from rbfrag.files import output_path, written_whole
 from rbfrag.fragility.model_selection import block_of
 from rbfrag.question.classify import kinds_by_numbers
 from rbfrag.question.sections import ANGLES
@@ -24,16 +27,21 @@ from rbfrag.question.table import (
     Header,
     columns_in,
     drainage_named,
+    header_of,
     kinds_in,
     sounds_like,
     yes_or_no,
 )
 from rbfrag.results.diagnostic import Diagnostic
 from rbfrag.solver.kinds import FREE_STANDING
+from rbfrag.vocabulary import quantities
 from rbfrag.vocabulary.quantities import (
     BLOCK,
     BY_ROW,
+    FAILURE,
     INPUTS,
+    MEASURED,
+    PLANES,
     QUANTITIES,
     SHAKING,
     column_of,
@@ -49,7 +57,7 @@ IF_EMPTY = {"count": 1.0, "weight": 1.0, "amplification": 1.0}
 """What an empty cell stands for; of a standard deviation it is 0."""
 
 ASSUMED = {"water_m": "assumed dry", "cohesion_pa": "assumed without cohesion"}
-"""What an empty cell of a field means beside filled ones."""
+"""What an empty cell of a field means next to filled ones."""
 
 EXAMPLE_NAME = "example"
 """Name of the row of the template that shows how to fill it in."""
@@ -115,7 +123,8 @@ class BlockTable:
                 values, cell_faults = self._yes_or_no(part, column)
             else:
                 unit = QUANTITIES[name].unit if name in INPUTS else ""
-                values, cell_faults = part.numbers(column.header, unit, column.factor)
+                read = _errors_of if name in MEASURED else TablePart.numbers
+                values, cell_faults = read(part, column.header, unit, column.factor)
             faults = cell_faults | faults
             empty = np.isnan(values)
             if cell_faults or not empty.all():
@@ -124,7 +133,8 @@ class BlockTable:
                 start = sum(self.read)
                 rows = self.gaps.setdefault(name, [])
                 rows.extend((np.flatnonzero(empty) + start).tolist())
-            stands_for = 0.0 if name.endswith("_sigma") else IF_EMPTY.get(name)
+            is_sigma = "_sigma" in name and name != "gmm_sigma"
+            stands_for = 0.0 if is_sigma else IF_EMPTY.get(name)
             numbers[name] = values if stands_for is None else np.where(empty, stands_for, values)
         self.read.append(len(part.lines))
         return numbers, faults
@@ -291,7 +301,9 @@ class BlockTable:
         }
         faults: dict[int, str] = {}
         lines: list[int] = []
-        texts = [name for name in self.texts if self._has(name)]
+        present = {*self.header.columns}
+        present |= {"kind"} if "free_standing" in present else set()
+        texts = [name for name in self.texts if name in present]
         for part in self.parts:
             numbers, wrong = self.numbers(part)
             columns: dict[str, NDArray[Any]] = {**numbers}
@@ -305,10 +317,27 @@ class BlockTable:
         table = {n: np.concatenate(arrays) for n, arrays in collected.items()}
         return {n: c for n, c in table.items() if c.size == len(lines)}, faults, lines
 
-    def _has(self, name: str) -> bool:
-        return name in self.header.columns or (
-            name == "kind" and "free_standing" in self.header.columns
-        )
+
+def _errors_of(
+    part: TablePart, header: str, unit: str, factor: float
+) -> tuple[NDArray[np.float64], dict[int, str]]:
+    """Return standard deviations of a measured field; a fraction of the field ("5%") is negative.
+
+    Arguments as for :meth:`TablePart.numbers`.
+    """
+    cells = cells_of(part.cells[header])
+    texts = [str(cell).strip() if isinstance(cell, str) else "" for cell in cells]
+    relative = [i for i, text in enumerate(texts) if text.endswith("%")]
+    if relative and unit != "deg":
+        bare = [text[:-1] if text.endswith("%") else cell
+                for text, cell in zip(texts, cells, strict=True)]  # fmt: skip
+        part = replace(part, cells={**part.cells, header: bare})
+    values, faults = part.numbers(header, unit, factor)
+    for i in np.flatnonzero(values < 0.0).tolist():
+        faults[i] = f"{header} = {cells[i]}: give a standard deviation of 0 or more"
+    if relative and unit != "deg":
+        values[relative] *= -0.01 / factor
+    return values, faults
 
 
 @contextmanager
@@ -375,3 +404,36 @@ def read_rows(
             row["back_fracture"] = bool(row["back_fracture"])
         rows.append({**defaults, **row, **({"reason": faults[i]} if i in faults else {})})
     return rows, table.warnings((*read, *texts))
+
+
+COLUMNS = ("block_id", *RECTANGLE, *PLANES, *FAILURE, "pgv_m_s", "pga_g")
+"""Fields that have a column; the others are listed on a sheet of their own."""
+
+EXAMPLE = {"block_id": "example", "height_m": 2.4, "width_m": 0.5, "beta_deg": 3.0, "phi_deg": 35.0}
+
+
+def write_template(path: str | os.PathLike[str]) -> Path:
+    """Write a table with one example row, completely or not at all, and return its path.
+
+    A workbook has a second sheet that lists all columns.
+
+    Args:
+        path: file to write, ``.xlsx`` or ``.csv``.
+    """
+    target = output_path(path, (".xlsx", ".csv"), "table")
+    names, row = map(header_of, COLUMNS), [EXAMPLE.get(name, "") for name in COLUMNS]
+    if target.suffix.lower() == ".csv":
+        columns = {name: np.array([cell]) for name, cell in zip(names, row, strict=True)}
+        return write_block_table(columns, target)
+    book = openpyxl().Workbook()
+    sheet, column_sheet = book.active, book.create_sheet("columns")
+    sheet.title, sheet.freeze_panes, column_sheet.freeze_panes = "blocks", "A2", "A2"
+    sheet.append([*names])
+    sheet.append(row)
+    column_sheet.append(["column", "description", "other names"])
+    for name in quantities.COLUMNS:
+        help = quantities.QUANTITIES[name].help(quantities.word_of)
+        column_sheet.append([header_of(name), help, ", ".join(quantities.INPUTS[name].aliases)])
+    with written_whole(target, "table") as partial:
+        book.save(partial)
+    return target

@@ -16,15 +16,18 @@ from typing import TYPE_CHECKING, Any
 from sqlalchemy import Connection
 
 from rbfrag.db.data_dictionary import (
+    TABLES,
+    VIEWS,
     ColumnMeaning,
+    chosen_columns,
     dictionary_as_json,
     dictionary_as_markdown,
+    frames,
 )
 from rbfrag.db.engine import opened_database
-from rbfrag.db.frames import TABLES, chosen_columns, frames
 from rbfrag.db.location import data_place
 from rbfrag.errors import InputError, WorkFailedError
-from rbfrag.exchange.excel_text import as_text, changed_texts, formula_warnings
+from rbfrag.exchange.tables.csv_file import as_text, changed_texts, formula_warnings
 from rbfrag.exchange.tables.parts import pyarrow
 from rbfrag.results.numbers import count_of
 from rbfrag.results.result import Result, TextTable
@@ -37,6 +40,11 @@ FORMATS = ("parquet", "csv")
 
 DICTIONARY = "data_dictionary"
 """Name of the two files that say what the columns mean."""
+
+DICTIONARY_HEAD = (
+    "# Data dictionary\n\nSI units; accelerations in g; units are in the column names. An "
+    "empty cell (CSV) or null (Parquet) is a missing value.\n\n"
+)
 
 
 @dataclass(frozen=True, repr=False)
@@ -86,7 +94,7 @@ def export_database(
         out: folder to make; it must not exist, or be empty.
         db: the database (path, URL, or None for the default).
         format: ``parquet`` or ``csv``.
-        tables: only these tables; None for all.
+        tables: only these tables or views; None for all tables.
         arrays: include samples and histories (Parquet only): lists of float64.
         excel_text: write texts that spreadsheets take for formulas with an apostrophe (CSV).
 
@@ -122,7 +130,22 @@ def export_database(
     )
     folder = Path(out)
     with opened_database(db, read_only=True) as engine, ExitStack() as stack:
-        draft = _draft_folder(folder)
+        try:
+            if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+                raise InputError(
+                    f"out {folder}: the folder is not empty; give a new folder", fields=("out",)
+                )
+            if not folder.absolute().parent.is_dir():
+                raise InputError(
+                    f"out {folder}: create the folder {folder.absolute().parent} first",
+                    fields=("out",),
+                )
+            draft = folder.absolute().with_name(f".{folder.name}.{secrets.token_hex(4)}.part")
+            draft.mkdir()
+        except OSError as error:
+            raise InputError(
+                f"out {folder}: cannot be made: {error.strerror or error}", fields=("out",)
+            ) from None
         stack.callback(shutil.rmtree, draft, ignore_errors=True)
         try:
             with engine.connect() as connection:
@@ -130,7 +153,10 @@ def export_database(
                     name: write(connection, name, columns, draft / f"{name}.{format}")
                     for name, columns in chosen.items()
                 }
-            _write_dictionary(draft)
+            document = json.dumps(dictionary_as_json(), indent=2, ensure_ascii=False) + "\n"
+            (draft / f"{DICTIONARY}.json").write_text(document, encoding="utf-8")
+            text = DICTIONARY_HEAD + dictionary_as_markdown()
+            (draft / f"{DICTIONARY}.md").write_text(text, encoding="utf-8")
             if folder.exists():
                 folder.rmdir()
             draft.rename(folder)
@@ -140,36 +166,6 @@ def export_database(
                 "was kept"
             ) from error
     return ExportReport(str(folder), format, rows, tuple(formulas[:1]))
-
-
-def _draft_folder(folder: Path) -> Path:
-    try:
-        if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
-            raise InputError(
-                f"out {folder}: the folder is not empty; give a new folder", fields=("out",)
-            )
-        if not folder.absolute().parent.is_dir():
-            raise InputError(
-                f"out {folder}: create the folder {folder.absolute().parent} first",
-                fields=("out",),
-            )
-        draft = folder.absolute().with_name(f".{folder.name}.{secrets.token_hex(4)}.part")
-        draft.mkdir()
-    except OSError as error:
-        raise InputError(
-            f"out {folder}: cannot be made: {error.strerror or error}", fields=("out",)
-        ) from None
-    return draft
-
-
-def _write_dictionary(folder: Path) -> None:
-    document = json.dumps(dictionary_as_json(), indent=2, ensure_ascii=False) + "\n"
-    (folder / f"{DICTIONARY}.json").write_text(document, encoding="utf-8")
-    text = (
-        "# Data dictionary\n\nSI units; accelerations in g; units are in the column names. An "
-        "empty cell (CSV) or null (Parquet) is a missing value.\n\n"
-    )
-    (folder / f"{DICTIONARY}.md").write_text(text + dictionary_as_markdown(), encoding="utf-8")
 
 
 def _write_csv(
@@ -223,7 +219,7 @@ def _write_parquet(
             )
             for column in columns
         ],
-        metadata={"meaning": TABLES[table].meaning},
+        metadata={"meaning": {**TABLES, **VIEWS}[table].meaning},
     )
     rows = 0
     with parquet.ParquetWriter(file, schema) as writer:
@@ -248,8 +244,9 @@ def read_table(
 
     Args:
         table: ``earthquake``, ``recording``, ``motion``, ``suite``, ``suite_motion``,
-            ``toppling_spectrum``, ``campaign``, ``combination``, ``outcome_interval``,
-            ``simulation``, ``response``, ``shock_pair`` or ``fragility_model``.
+            ``motion_spectrum``, ``recording_spectrum``, ``toppling_spectrum``, ``campaign``,
+            ``combination``, ``outcome_interval``, ``simulation``, ``response``, ``shock_pair`` or
+            ``fragility_model``; or one of the views ``outcome`` and ``critical_value``.
         db: the database (path, URL, or None for the default, else the built-in data).
         columns: only these columns.
         arrays: include samples [g] and histories, as one float64 array a row.

@@ -11,19 +11,23 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rbfrag.errors import InputError, UnknownModelError
-from rbfrag.exchange.block_inputs import collect_blocks
-from rbfrag.exchange.block_rows import PLACE, PORTFOLIO, BlockRows, Blocks
+from rbfrag.exchange.block_rows import PLACE, PORTFOLIO, BlockRows, Blocks, collect_blocks
 from rbfrag.exchange.nearest_site import WITHIN_KM, join_sites
-from rbfrag.exchange.openquake.events import (
+from rbfrag.exchange.openquake_events import (
     JobFiles,
+    job_files,
     measures_in,
     read_events,
     read_magnitudes,
 )
-from rbfrag.fragility.invalid_rows import FROM_SUMS
 from rbfrag.fragility.model import FragilityModel
+from rbfrag.fragility.validation import FROM_SUMS
+from rbfrag.hazards.curve import requested_measure
 from rbfrag.hazards.event_set import EventSet
-from rbfrag.hazards.im_uncertainty import (
+from rbfrag.hazards.loss_answer import LossAnswer
+from rbfrag.hazards.losses import Run, event_losses
+from rbfrag.hazards.portfolio import Portfolio
+from rbfrag.hazards.shaking import (
     LAW_TAU,
     PGA_ALONE,
     PREFERRED,
@@ -31,10 +35,6 @@ from rbfrag.hazards.im_uncertainty import (
     component_of_velocity,
     velocity_of,
 )
-from rbfrag.hazards.loss_answer import LossAnswer
-from rbfrag.hazards.losses import Run, event_losses
-from rbfrag.hazards.measure_type import requested_measure
-from rbfrag.hazards.portfolio import Portfolio
 from rbfrag.question.components import Component, component_named
 from rbfrag.question.fields import AnsweringFields, BlockKeywords, V
 from rbfrag.question.keywords import LEVEL, model_for, parts_of
@@ -104,7 +104,7 @@ def losses(
         run: does the parts of the work; None for this process.
         on_progress: called with the numbers of events done and of all.
         question: instead of a table the fields of blocks at the one site, with ``kind``, as
-            :func:`rbfrag.predict` has them, beside one the kind of rows that state none;
+            :func:`rbfrag.predict` has them, with a table the kind of rows without one;
             ``model``, ``level`` and ``db``, likewise; ``investigation_time``: years of one event
             set, where no file of ruptures states it; ``ses``: number of event sets of each
             realization, likewise.
@@ -118,13 +118,24 @@ def losses(
     """
     inputs, answering, lasted = parts_of((), question, BLOCKS, ANSWERING, _Lasted.__optional_keys__)
     rows = collect_blocks(inputs, blocks, reads=(*PLACE, *PORTFOLIO), one_kind=False)
-    job = JobFiles.of(folder, files)
+    job = job_files(folder, files)
     meaning = component_named("rotd50" if component is None else component)
-    events = read_events(job, imts=imt or _best(job), **lasted)
+    if not imt:  # the best predictor among the measures of the job
+        present = {requested_measure(name)[0]: name for name in measures_in(job)}
+        imt = (next((present[n] for n in (*PREFERRED, "pga_g") if n in present), "PGV"),)
+    events = read_events(job, imts=imt, **lasted)
     events, meaning, tau, remark = _by_one_measure(events, job, meaning, answering)
-    rows, models = _with_models(
-        _at_sites(rows, events, within_km), tuple(events.measures), answering
-    )
+    # the sites of the blocks, without blocks that have no site
+    place = rows.blocks, events.site_ids, events.coordinates
+    join = join_sites(*place, within_km=within_km, of="event")
+    ids = rows.columns.get("site_id", np.full(rows.reasons.size, "", dtype=object)).copy()
+    at_one = join.site >= 0
+    names = np.array(events.site_ids, dtype=object)
+    ids[rows.blocks["row"][at_one]] = names[join.site[at_one]]
+    columns, remarks = {**rows.columns, "site_id": ids}, (*rows.remarks, *join.remarks)
+    rows = replace(rows, columns=columns, remarks=remarks)
+    rows = rows.without(~at_one, join.reasons.__getitem__)
+    rows, models = _with_models(rows, tuple(events.measures), answering)
     portfolio = Portfolio.of(rows.blocks, events.site_ids, models, meaning)
     about = (
         Diagnostic(
@@ -136,9 +147,14 @@ def losses(
         if component is None
         else meaning.in_words("the measures are")
     )
+    empty = int(np.isnan(rows.blocks.get("loss", np.empty(0))).sum())
+    without_loss = (
+        f"{empty:,} of {rows.blocks['row'].size:,} blocks have no loss and count as 0: losses are "
+        "lower bounds"
+    )
     texts = (
         *rows.describe_invalid(FROM_SUMS),
-        *_without_loss(rows),
+        *([without_loss] if empty else []),
         *events.warnings,
         *doubts_about(events.measures),
         *remark,
@@ -151,12 +167,6 @@ def losses(
     if "loss" in rows.blocks:
         answer.block_rates[2, np.isnan(rows.blocks["loss"])] = np.nan
     return replace(answer, rejected=rows.rejected_by_row(), tau=tau)
-
-
-def _best(job: JobFiles) -> tuple[str, ...]:
-    """Return the best predictor among the measures of a job."""
-    present = {requested_measure(name)[0]: name for name in measures_in(job)}
-    return (next((present[n] for n in (*PREFERRED, "pga_g") if n in present), "PGV"),)
 
 
 def _by_one_measure(
@@ -191,19 +201,6 @@ def _by_one_measure(
     return by_velocity, component_of_velocity(meaning), LAW_TAU, (remark,)
 
 
-def _at_sites(rows: BlockRows, events: EventSet, within_km: float) -> BlockRows:
-    """Return the table with the sites of its blocks, without blocks that have no site."""
-    blocks, names = rows.blocks, np.array(events.site_ids, dtype=object)
-    join = join_sites(blocks, events.site_ids, events.coordinates, within_km=within_km, of="event")
-    ids = rows.columns.get("site_id", np.full(rows.reasons.size, "", dtype=object)).copy()
-    at_one = join.site >= 0
-    ids[blocks["row"][at_one]] = names[join.site[at_one]]
-    rows = replace(
-        rows, columns={**rows.columns, "site_id": ids}, remarks=(*rows.remarks, *join.remarks)
-    )
-    return rows.without(~at_one, join.reasons.__getitem__)
-
-
 def _with_models(
     rows: BlockRows, measures: Sequence[str], answering: AnsweringFields
 ) -> tuple[BlockRows, dict[str, FragilityModel]]:
@@ -217,14 +214,3 @@ def _with_models(
     if not models:
         raise without[kinds[0]]
     return rows.without(np.isin(kinds, [*without]), lambda i: str(without[kinds[i]])), models
-
-
-def _without_loss(rows: BlockRows) -> tuple[str, ...]:
-    """Return the warnings about blocks whose loss is an empty cell."""
-    empty = int(np.isnan(rows.blocks.get("loss", np.empty(0))).sum())
-    if not empty:
-        return ()
-    return (
-        f"{empty:,} of {rows.blocks['row'].size:,} blocks state no loss and count none: losses are "
-        "lower bounds",
-    )

@@ -1,27 +1,27 @@
-"""Fragility functions for other tools: `rbfrag.export.nrml` and `rbfrag.export.pelicun`."""
+"""Fragility functions for and from other tools: `rbfrag.export.nrml`, `rbfrag.export.pelicun`."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+import os
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from os import PathLike
+from pathlib import Path
 from typing import Any, NamedTuple, TypedDict, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rbfrag.errors import InputError
-from rbfrag.exchange.block_fragility import BlockFunctions, block_functions
-from rbfrag.exchange.block_inputs import collect_blocks, read_by_models
-from rbfrag.exchange.block_rows import Blocks
+from rbfrag.exchange.block_fragility import BlockFunctions, block_functions, share_functions
+from rbfrag.exchange.block_rows import Blocks, collect_blocks, read_by_models
 from rbfrag.exchange.fragility_function import renamed
-from rbfrag.exchange.nrml import nrml_text
-from rbfrag.exchange.pelicun_table import metadata_text, pelicun_text
-from rbfrag.exchange.share_fragility import share_functions
+from rbfrag.exchange.nrml import nrml_text, read_nrml
+from rbfrag.exchange.pelicun_table import metadata_text, pelicun_text, read_pelicun
 from rbfrag.files import output_path, write_text
 from rbfrag.fragility import describe
 from rbfrag.fragility.method import TOPPLING_BLOCK
-from rbfrag.hazards.measure_type import requested_measure
+from rbfrag.hazards.curve import requested_measure
 from rbfrag.question.components import SINGLE_COMPONENT, Component, component_named
 from rbfrag.question.fields import AnsweringFields, BlockKeywords, V
 from rbfrag.question.keywords import parts_of
@@ -41,7 +41,7 @@ class ExportAnswer(Result):
 
     Args:
         file: the file.
-        description: the file beside it that describes them; None where there is none.
+        description: the file next to it that describes them; None where there is none.
         functions: number of functions.
         lognormal: how many of them are lognormal.
         largest_relative_error: largest error of linear interpolation between their levels, as
@@ -168,16 +168,16 @@ def pelicun(
         DatabaseError: the database cannot be read.
     """
     target = output_path(out, (".csv",), "fragility table")
-    beside = output_path(str(target.with_suffix(".json")), (".json",), "description")
+    description_path = output_path(str(target.with_suffix(".json")), (".json",), "description")
     request = _Request.of(numbers, question)
     result, renames = request.functions(_NOT_IN_TABLES)
     content = pelicun_text(result.functions)
     description = metadata_text(
         result.functions, request.descriptions(), result.about, request.component.title
     )
-    write_text(description, beside)
+    write_text(description, description_path)
     write_text(content, target)
-    return request.answer(str(target), str(beside), result, renames)
+    return request.answer(str(target), str(description_path), result, renames)
 
 
 _NOT_IN_NRML = "#'\"", "_", "the OpenQuake engine rejects in an ID"
@@ -300,3 +300,40 @@ class _Request(NamedTuple):
             self.component.name, *result.about,
             warnings=(*self.remarks, *renames, *meant, *result.warnings),
         )  # fmt: skip
+
+
+FloatArray = NDArray[np.float64]
+
+MOST_CURVES = 12
+"""More curves than these cannot be told apart."""
+
+
+def of_measure(
+    path: str | os.PathLike[str], measure: str
+) -> dict[str, Callable[[FloatArray], FloatArray]]:
+    """Return the fragility functions of one measure by asset and limit state.
+
+    Args:
+        path: NRML (.xml) or a pelicun table (.csv).
+        measure: ``pgv_m_s`` or ``pga_g``.
+    """
+    suffix = Path(path).suffix.lower()
+    if suffix not in (".xml", ".csv"):
+        raise InputError(
+            f"{path}: unsupported file of fragility functions: use .xml (NRML) or .csv (pelicun)"
+        )
+    functions = read_nrml(path) if suffix == ".xml" else read_pelicun(path)
+    curves: dict[str, Callable[[FloatArray], FloatArray]] = {
+        f"{function.name}, {function.limit_state}": function.at
+        for function in functions
+        if function.kind.measure == measure
+    }
+    if not curves:
+        have = ", ".join(sorted({function.kind.imt for function in functions})) or "none of ground"
+        raise InputError(f"{path}: there is no fragility over {measure}; there are {have}")
+    if len(curves) > MOST_CURVES:
+        raise InputError(
+            f"{path}: {len(curves)} fragilities exceed the maximum of {MOST_CURVES} for a figure: "
+            "reduce the file"
+        )
+    return curves

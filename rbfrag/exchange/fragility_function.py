@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.special import ndtr
 
 from rbfrag.errors import InputError
-from rbfrag.hazards.measure_type import IntensityType
+from rbfrag.hazards.curve import IntensityType
 from rbfrag.results.diagnostic import Diagnostic
 from rbfrag.solver.results import FloatArray
 

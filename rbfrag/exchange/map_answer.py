@@ -11,13 +11,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rbfrag.errors import InputError
-from rbfrag.exchange.block_inputs import collect_blocks, read_by_models
-from rbfrag.exchange.block_rows import PLACE, Blocks
+from rbfrag.exchange.block_rows import PLACE, Blocks, collect_blocks, read_by_models
 from rbfrag.exchange.shakemap import at_places, has_all_fields, read_shakemap
 from rbfrag.fragility import describe
-from rbfrag.fragility.invalid_rows import FROM_MEAN, FROM_SUMS
-from rbfrag.hazards.maps.map_failures import MapFailures, SiteLocations, map_failures
-from rbfrag.hazards.maps.site_probability import site_probability
+from rbfrag.fragility.validation import FROM_MEAN, FROM_SUMS
+from rbfrag.hazards.map_failures import MapFailures, map_failures
+from rbfrag.hazards.map_probability import site_probability
 from rbfrag.question.classify import numbers_in
 from rbfrag.question.components import component_named
 from rbfrag.question.fields import AnsweringFields, BlockKeywords, V
@@ -225,7 +224,6 @@ def shakemap(
             "assumed to be certain; uncertainty.xml has it"
         )
         warnings.append(Diagnostic(text, "shaking_certain"))
-    locations = SiteLocations.of(lon, lat, table.get("site_id") if has_coordinates else None)
     if (
         count is not None and has_coordinates
     ):  # identical blocks of a row have azimuths of their own
@@ -237,8 +235,9 @@ def shakemap(
             pair_probability=answer.pair_probability[pairs],
         )
     failures = map_failures(
-        answer, read, locations, weight=weight, draws=draws, seed=seed, on_progress=on_progress
-    )
+        answer, read, lon, lat, site_names=table.get("site_id") if has_coordinates else None,
+        weight=weight, draws=draws, seed=seed, on_progress=on_progress,
+    )  # fmt: skip
     warnings += failures.warnings
     outside = int((~answer.in_domain & (answer.probability > NOTABLE)).sum())
     if outside:
@@ -269,18 +268,20 @@ def shakemap(
         columns["warnings"] = codes_by_row(rows.remarks, rows.reasons.size)[table["row"]]
         columns["reason"] = np.full(lon.size, "", dtype=object)
         columns = rows.with_rejected(columns)
+    size = table["kind"].size
+    described = f"{size} blocks at their places" if has_coordinates else f"mean of {size} blocks"
+    if size == 1 and not has_coordinates:
+        block = {name: values[0] for name, values in numbers_in(table).items()}
+        described = f"block with {describe.labelled_values(block, 6)}"
     event = shaken.event
-    name = " ".join(part for part in (event.description, event.time[:10]) if part)
-    if event.magnitude is not None:
-        name += f", M {event.magnitude:g}"
+    name = " ".join(part for part in (event["event"], event["time"][:10]) if part)
+    if event["magnitude"] is not None:
+        name += f", M {event['magnitude']:g}"
     return ShakeMapAnswer(
         columns=columns,
         failures=failures,
         about={
-            "event_id": event.event_id,
-            "event": event.description,
-            "magnitude": event.magnitude,
-            "time": event.time,
+            **event,
             "how": by_model(chosen.name),
             "model": chosen.name,
             "term": chosen.term.name,
@@ -292,21 +293,11 @@ def shakemap(
             "seed": seed,
         },
         warnings=tuple(warnings),
-        title=f"{name}\n{_describe_blocks(table, has_coordinates)}; model "
+        title=f"{name}\n{described}; model "
         f"{describe.stored_model(chosen.row)}"
         + ("" if shaking.integrated else "\nthe uncertainty of the map's values is left out"),
-        epicentre=None if event.lon is None or event.lat is None else (event.lon, event.lat),
+        epicentre=shaken.epicentre,
         shape=(shaken.rows, shaken.columns)
         if shaken.is_whole and is_complete.all() and not has_coordinates
         else None,
     )
-
-
-def _describe_blocks(blocks: Mapping[str, Any], has_coordinates: bool) -> str:
-    size = blocks["kind"].size
-    if has_coordinates:
-        return f"{size} blocks at their places"
-    if size == 1:
-        numbers = {name: values[0] for name, values in numbers_in(blocks).items()}
-        return f"block with {describe.labelled_values(numbers, 6)}"
-    return f"mean of {size} blocks"

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from rbfrag.errors import InputError, MissingExtraError
 from rbfrag.files import MOST_BYTES, as_path, bounded_bytes, reading
 from rbfrag.results.diagnostic import Diagnostic
-from rbfrag.solver.block.mesh_block import CONTACT_MM, MassProperties, MeshBlock, mesh_block
+from rbfrag.solver.block.mesh_block import CONTACT_MM, MeshBlock, mesh_block
 
 if TYPE_CHECKING:
     from trimesh import Trimesh
@@ -65,16 +65,13 @@ def block_from_mesh(
             f"{source}: not the mesh of a block ({str(error)[:120]}): export it again"
         ) from None
     volume = float(mesh.volume)
-    mass = MassProperties(
-        volume_m3=volume,
-        centre_m=np.asarray(mesh.center_mass, dtype=np.float64) + middle,
-        inertia_m2=np.asarray(mesh.moment_inertia, dtype=np.float64) / volume + 0.0,  # no -0
-    )
     try:
         return mesh_block(
             source.stem,
             np.asarray(mesh.vertices, dtype=np.float64) + middle,
-            mass,
+            volume_m3=volume,
+            centre_m=np.asarray(mesh.center_mass, dtype=np.float64) + middle,
+            inertia_m2=np.asarray(mesh.moment_inertia, dtype=np.float64) / volume + 0.0,  # no -0
             up=up,
             contact_mm=contact_mm,
             density_kg_m3=density_kg_m3,
@@ -92,16 +89,29 @@ def _closed_surface(source: Path) -> tuple[Trimesh, NDArray[np.float64], list[st
         raise InputError(
             f"{source}: a vertex is not finite or beyond arithmetic: give coordinates in metres"
         )
-    notes = _coarse_numbers(vertices)
+    notes = []
+    single = vertices.astype(np.float32)
+    step_m = float(np.spacing(np.abs(single).max()))
+    if step_m > 1e-3 and np.array_equal(single, vertices):
+        notes.append(
+            f"coordinates of up to {np.abs(vertices).max():.7g} m are stored in single precision, "
+            f"in steps of {1e3 * step_m:.3g} mm: export the mesh with its origin near the block"
+        )
     # from its own middle, a block in map coordinates loses no digits
     middle = 0.5 * (vertices.min(axis=0) + vertices.max(axis=0))
     mesh.vertices = vertices - middle
     # corners that a file repeats, for a texture or for each triangle, become one
     mesh.merge_vertices(merge_tex=True, merge_norm=True)
-    _without_double_faces(mesh, notes)
+    faces = np.sort(np.asarray(mesh.faces), axis=1)
+    mesh.update_faces((faces[:, 0] != faces[:, 1]) & (faces[:, 1] != faces[:, 2]))
+    before = len(mesh.faces)
+    mesh.update_faces(mesh.unique_faces())
+    if len(mesh.faces) < before:
+        notes.append(f"{before - len(mesh.faces)} faces were there twice and count once")
     mesh.remove_unreferenced_vertices()
     _close(source, mesh, notes)
-    _reject_several_bodies(source, mesh)
+    if (bodies := int(mesh.body_count)) > 1:
+        raise InputError(f"{source} has {bodies} separate closed surfaces: keep one")
     _turn_outwards(source, mesh, notes)
     if not mesh.volume > 1e-9 * float(np.ptp(vertices, axis=0).max()) ** 3:
         raise InputError(
@@ -148,27 +158,6 @@ def _triangles(source: Path) -> Trimesh:
     return mesh
 
 
-def _coarse_numbers(vertices: NDArray[np.float64]) -> list[str]:
-    single = vertices.astype(np.float32)
-    step_m = float(np.spacing(np.abs(single).max()))
-    if step_m <= 1e-3 or not np.array_equal(single, vertices):
-        return []
-    return [
-        f"coordinates of up to {np.abs(vertices).max():.7g} m are stored in single precision, in "
-        f"steps of {1e3 * step_m:.3g} mm: export the mesh with its origin near the block"
-    ]
-
-
-def _without_double_faces(mesh: Trimesh, notes: list[str]) -> None:
-    """Remove degenerate and duplicate triangles."""
-    faces = np.sort(np.asarray(mesh.faces), axis=1)
-    mesh.update_faces((faces[:, 0] != faces[:, 1]) & (faces[:, 1] != faces[:, 2]))
-    before = len(mesh.faces)
-    mesh.update_faces(mesh.unique_faces())
-    if len(mesh.faces) < before:
-        notes.append(f"{before - len(mesh.faces)} faces were there twice and count once")
-
-
 def _close(source: Path, mesh: Trimesh, notes: list[str]) -> None:
     if mesh.is_watertight:
         return
@@ -186,12 +175,6 @@ def _close(source: Path, mesh: Trimesh, notes: list[str]) -> None:
     else:
         reason = f"no surface of one body: {shared} edges are shared by more than two faces"
     raise InputError(f"{source}: the mesh is {reason}; an open surface has no volume: {_CLOSE_IT}")
-
-
-def _reject_several_bodies(source: Path, mesh: Trimesh) -> None:
-    bodies = int(mesh.body_count)
-    if bodies > 1:
-        raise InputError(f"{source} has {bodies} separate closed surfaces: keep one")
 
 
 def _turn_outwards(source: Path, mesh: Trimesh, notes: list[str]) -> None:

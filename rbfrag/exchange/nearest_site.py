@@ -1,4 +1,4 @@
-"""Assignment of blocks to the sites of hazard curves or events: by name, or by coordinates."""
+"""Blocks at the sites of hazard curves or events: joined by name, or by coordinates."""
 
 from __future__ import annotations
 
@@ -10,7 +10,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rbfrag.errors import InputError
-from rbfrag.hazards.maps.spatial_field import EARTH_RADIUS_KM, on_sphere
+from rbfrag.hazards.curve import HazardCurve
+from rbfrag.hazards.map_failures import EARTH_RADIUS_KM, on_sphere
+from rbfrag.question.classify import numbers_in
 from rbfrag.results.diagnostic import Diagnostic
 from rbfrag.solver.results import FloatArray
 
@@ -96,12 +98,26 @@ def join_sites(
         far = distance[:, 0] > within_km
         site[rest] = np.where(far, -1, nearest)
         for k in np.flatnonzero(far).tolist():
-            i = nearest[k]
+            name, where = names[nearest[k]], "lon {:g}, lat {:g}".format(*lon_lat[nearest[k]])
             reasons[int(rest[k])] = (
-                f"the nearest site, {_in_words(names[i], lon_lat[i])}, is {distance[k, 0]:.3g} km "
-                f"away: within_km is {within_km:g}"
+                f"the nearest site, {f'{name!r} ({where})' if name else where}, is "
+                f"{distance[k, 0]:.3g} km away: within_km is {within_km:g}"
             )
-        remarks += _of_distances(columns["block_id"], rest[~far], distance[~far])
+        used, distance = rest[~far], distance[~far]
+        texts = []
+        if used.size:
+            texts.append(
+                "blocks stand at the nearest sites by their lon and lat, at most "
+                f"{distance[:, 0].max():.2g} km away"
+            )
+        doubtful = np.flatnonzero(distance[:, 1] <= _NEARLY * distance[:, 0])
+        if doubtful.size:
+            block_id, pair = columns["block_id"][used[doubtful[0]]], distance[doubtful[0]].tolist()
+            texts.append(
+                f"{doubtful.size:,} of {used.size:,} blocks are nearly as near (10 %) to a second "
+                f"site, such as block {block_id}: {pair[0]:.3g} and {pair[1]:.3g} km"
+            )
+        remarks += [Diagnostic(text, "site_join") for text in texts]
     elif count > 1:
         raise InputError(
             f"there are {count} sites, and {rest.size} of {n} blocks have no site: add the column "
@@ -124,25 +140,107 @@ def _nearest(points: FloatArray, sites: FloatArray) -> tuple[NDArray[np.intp], F
     return np.asarray(nearest)[:, 0], np.where(np.isfinite(chords), arcs, np.inf)
 
 
-def _in_words(name: str, place: FloatArray) -> str:
-    where = f"lon {place[0]:g}, lat {place[1]:g}"
-    return f"{name!r} ({where})" if name else where
+@dataclass(frozen=True, eq=False)
+class SitedBlocks:
+    """Blocks at the sites of hazard curves.
+
+    Args:
+        sites: curves of each site at which a block stands, one from each file.
+        columns: ``block_id``, ``kind`` and numbers of the blocks.
+        site: index of the site of each block, shape (m,).
+        remarks: warnings about the blocks.
+        missing: by index of the rows given, the reasons of those of sites that have no curve.
+    """
+
+    sites: list[list[HazardCurve]]
+    columns: Mapping[str, Any]
+    site: NDArray[np.intp]
+    remarks: tuple[str, ...] = ()
+    missing: Mapping[int, str] = field(default_factory=dict)
+
+    @property
+    def inputs(self) -> dict[str, Any]:
+        """Inputs of the blocks, by field, and their kinds."""
+        return {**numbers_in(self.columns), "kind": [str(kind) for kind in self.columns["kind"]]}
+
+    def inputs_of(self, columns: Mapping[str, Any]) -> dict[str, Any]:
+        """Return other inputs of the same blocks, NaN for one that has none.
+
+        Args:
+            columns: those of all rows of the table, or of the one block.
+        """
+        rows = self.columns.get("row", np.zeros(self.site.size, dtype=np.intp))
+        kinds = np.asarray(columns["kind"], dtype=object)[rows]
+        return {
+            **{name: np.asarray(values)[rows] for name, values in numbers_in(columns).items()},
+            "kind": np.where(kinds == "", self.columns["kind"], kinds).tolist(),
+        }
+
+    @property
+    def names(self) -> list[str | None]:
+        """Identifiers of the blocks."""
+        return list(self.columns["block_id"])
 
 
-def _of_distances(block_ids: Any, used: NDArray[np.intp], distance: FloatArray) -> list[Diagnostic]:
-    """Return warnings about distances of blocks from their sites, and about ambiguous sites."""
-    if not used.size:
-        return []
-    texts = [
-        "blocks stand at the nearest sites by their lon and lat, at most "
-        f"{distance[:, 0].max():.2g} km away"
+def blocks_at_sites(
+    files: Sequence[Sequence[HazardCurve]],
+    columns: Mapping[str, Any],
+    *,
+    site_chosen: bool = False,
+    within_km: float = WITHIN_KM,
+) -> SitedBlocks:
+    """Return the blocks assigned to the sites of hazard curves.
+
+    Blocks are joined as :func:`join_sites` does; a single one without a place is asked about at
+    each site.
+
+    Args:
+        files: curves of each file, of one measure, one a site.
+        site_chosen: one site of several was asked for: blocks of others are left out.
+        within_km: farthest distance from a block to its site [km].
+
+    Raises:
+        InputError: files of other sites, no block at any of them, or several blocks of which it is
+            not known at which of several sites they stand.
+    """
+    by_site: dict[tuple[Any, ...], list[HazardCurve]] = {}
+    for curves in files:
+        for curve in curves:
+            key: tuple[Any, ...] = (curve.site,)
+            if not curve.site and curve.lon is not None and curve.lat is not None:
+                # the last digits differ between files
+                key = round(curve.lon, 3), round(curve.lat, 3)
+            by_site.setdefault(key, []).append(curve)
+    sites = list(by_site.values())
+    for curves in sites:
+        if len(curves) != len(files):
+            raise InputError(
+                f"site {curves[0].place or 'without a name'} is in {len(curves)} of {len(files)} "
+                "files: give curves of the same sites"
+            )
+    first, size = [curves[0] for curves in sites], len(columns["kind"])
+    if not {"site_id", "lon"} & {*columns}:
+        if len(sites) == 1:
+            return SitedBlocks(sites, columns, np.zeros(size, dtype=np.intp))
+        if size == 1:
+            everywhere = {name: np.repeat(np.asarray(v), len(sites)) for name, v in columns.items()}
+            return SitedBlocks(sites, everywhere, np.arange(len(sites)))
+    coordinates = [
+        (np.nan if c.lon is None else c.lon, np.nan if c.lat is None else c.lat) for c in first
     ]
-    doubtful = np.flatnonzero(distance[:, 1] <= _NEARLY * distance[:, 0])
-    if doubtful.size:
-        i = int(doubtful[0])
-        first, second = distance[i].tolist()
-        texts.append(
-            f"{doubtful.size:,} of {used.size:,} blocks are nearly as near (10 %) to a second "
-            f"site, such as block {block_ids[used[i]]}: {first:.3g} and {second:.3g} km"
-        )
-    return [Diagnostic(text, "site_join") for text in texts]
+    join = join_sites(columns, [c.site for c in first], coordinates, within_km=within_km)
+    missing, indices = join.reasons, np.flatnonzero(join.site >= 0)
+    if not indices.size and site_chosen:
+        raise InputError(f"no block is at site {', '.join(c.place for c in first)}")
+    if not indices.size:
+        raise InputError(f"no block can be used: {next(iter(missing.values()))}")
+    remarks = [*join.remarks]
+    if missing and site_chosen:
+        text = f"{len(missing)} blocks of other sites are left out"
+        remarks.append(Diagnostic(text, "site_join"))
+    used, site = np.unique(join.site[indices], return_inverse=True)
+    block_columns = {name: np.asarray(values)[indices] for name, values in columns.items()}
+    return SitedBlocks(
+        [sites[i] for i in used.tolist()], block_columns, site, tuple(remarks),
+        {} if site_chosen else missing,
+    )  # fmt: skip

@@ -18,7 +18,7 @@ from rbfrag.exchange.fragility_function import (
 )
 from rbfrag.exchange.xml_source import Node, read_xml
 from rbfrag.files import number_at
-from rbfrag.hazards.measure_type import IntensityType, openquake_type
+from rbfrag.hazards.curve import IntensityType, openquake_type
 
 _UNITS = {"g": 1.0, "cm/s": 0.01, "m/s": 1.0}
 
@@ -48,7 +48,19 @@ def read_nrml(path: str | os.PathLike[str]) -> list[FragilityFunction]:
         raise InputError(f"{source}, line {limit_states.line}: there is no limit state")
     functions = []
     for asset in assets:
-        name, form = _name_and_format(asset, model, source)
+        if asset.name == "ffs":
+            taxonomy = next(asset.of("taxonomy"), None)
+            name = "" if taxonomy is None else taxonomy.text.strip()
+            form = model.attributes.get("format", "")
+        elif "id" not in asset.attributes:
+            raise InputError(f"{source}, line {asset.line}: fragilityFunction has no id")
+        else:
+            name, form = asset.attributes["id"], asset.attributes.get("format", "")
+            shape = asset.attributes.get("shape", "logncdf")
+            if form == "continuous" and shape != "logncdf":
+                raise InputError(
+                    f"{source}, line {asset.line}: unsupported shape {shape!r}: use logncdf"
+                )
         curves = _curves(asset, source)
         for state in states:
             if state not in curves:
@@ -65,18 +77,6 @@ def read_nrml(path: str | os.PathLike[str]) -> list[FragilityFunction]:
             where = f"{source}, line {asset.line}, {name!r}, {state}"
             functions.append(_function(asset, name, form, state, curves[state], where))
     return functions
-
-
-def _name_and_format(asset: Node, model: Node, source: str) -> tuple[str, str]:
-    if asset.name == "ffs":
-        taxonomy = next(asset.of("taxonomy"), None)
-        return "" if taxonomy is None else taxonomy.text.strip(), model.attributes.get("format", "")
-    if "id" not in asset.attributes:
-        raise InputError(f"{source}, line {asset.line}: fragilityFunction has no id")
-    form, shape = asset.attributes.get("format", ""), asset.attributes.get("shape", "logncdf")
-    if form == "continuous" and shape != "logncdf":
-        raise InputError(f"{source}, line {asset.line}: unsupported shape {shape!r}: use logncdf")
-    return asset.attributes["id"], form
 
 
 def _curves(asset: Node, source: str) -> dict[str, Node]:

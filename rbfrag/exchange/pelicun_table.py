@@ -20,7 +20,7 @@ from rbfrag.exchange.fragility_function import (
     lognormal_function,
 )
 from rbfrag.files import csv_rows, source_text
-from rbfrag.hazards.measure_type import IntensityType
+from rbfrag.hazards.curve import IntensityType
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.version import __version__
 
@@ -145,26 +145,20 @@ def read_pelicun(path: str | os.PathLike[str]) -> list[FragilityFunction]:
         ]
         if row.get("Incomplete", "0") not in ("", "0") or not states:
             continue
-        kind = _kind(row["Demand-Type"], row["Demand-Unit"], f"{path}, line {line}")
-        if kind is not None:
-            functions += [
-                _function(row, state, kind, f"{path}, line {line}, {state}") for state in states
-            ]
+        demand, unit, where = row["Demand-Type"], row["Demand-Unit"], f"{path}, line {line}"
+        name, period = demand, ""
+        if "Spectral" in demand:
+            name, _, period = demand.removeprefix("Peak ").partition("|")
+        if name not in _UNITS:
+            continue  # not a measure of the ground motion
+        measure, units = _UNITS[name]
+        if unit not in units:
+            use = ", ".join(units)
+            raise InputError(f"{where}: {demand} in {unit!r} is not supported: use {use}")
+        period_s = _number(period, where) if measure == "sa_g" else None
+        kind = IntensityType(measure, units[unit], period_s)
+        functions += [_function(row, state, kind, f"{where}, {state}") for state in states]
     return functions
-
-
-def _kind(demand: str, unit: str, where: str) -> IntensityType | None:
-    """Return the intensity measure of a demand; None if it is not a ground-motion measure."""
-    name, _, period = (
-        demand.removeprefix("Peak ").partition("|") if "Spectral" in demand else (demand, "", "")
-    )
-    if name not in _UNITS:
-        return None
-    measure, units = _UNITS[name]
-    if unit not in units:
-        raise InputError(f"{where}: {demand} in {unit!r} is not supported: use {', '.join(units)}")
-    period_s = _number(period, where) if measure == "sa_g" else None
-    return IntensityType(measure, units[unit], period_s)
 
 
 def _function(

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import RegularGridInterpolator
 
 from rbfrag.errors import InputError
-from rbfrag.exchange.xml_source import parse_xml
+from rbfrag.exchange.xml_source import xml_events
+from rbfrag.files import is_numeral
 from rbfrag.results.diagnostic import Diagnostic
 from rbfrag.vocabulary.quantities import MEASURES
 
@@ -33,230 +35,7 @@ _MEASURES: Mapping[str, tuple[str, Mapping[str, float]]] = {
 """Measures that are read of a grid: our name, and its units with their factors; a blank unit is the
 first of them."""
 
-_STD = "std_ln_"
-_FIELDS: Mapping[str, tuple[str, Mapping[str, float]]] = {
-    **_MEASURES,
-    # the standard deviation of a logarithm does not depend on the unit inside
-    **{
-        f"STD{title}": (_STD + name, {f"ln({unit})": 1.0 for unit in units})
-        for title, (name, units) in _MEASURES.items()
-    },
-}
-
 _MOST_STD = 5.0
-
-
-@dataclass(frozen=True)
-class ShakeMapEvent:
-    """The earthquake of a ShakeMap, epicentre in degrees; None where the file has no value."""
-
-    event_id: str
-    magnitude: float | None
-    depth_km: float | None
-    lat: float | None
-    lon: float | None
-    time: str
-    description: str
-    version: str
-
-
-@dataclass
-class GridReading:
-    """State of reading a ShakeMap grid from XML.
-
-    Args:
-        source: path of the file.
-        needed: fields of which one must be there beside LON and LAT.
-    """
-
-    source: str
-    needed: tuple[str, ...]
-    root: Mapping[str, str] = field(default_factory=dict)
-    event: Mapping[str, str] = field(default_factory=dict)
-    size: Mapping[str, str] = field(default_factory=dict)
-    grid_fields: dict[str, tuple[int, str, int]] = field(default_factory=dict)
-    blocks: list[FloatArray] = field(default_factory=list)
-    rest: str = ""
-    in_data: bool = False
-    is_grid: bool = False
-    data_line: int = 0
-    values: int = 0
-
-    def start(self, name: str, attributes: Mapping[str, str], line: int) -> None:
-        """Process a start tag."""
-        if name == "shakemap_grid":
-            self.is_grid, self.root = True, attributes
-        elif name == "event":
-            self.event = attributes
-        elif name == "grid_specification":
-            self.size = attributes
-        elif name == "grid_field":
-            where = f"{self.source}, line {line}"
-            index, title = attributes.get("index", ""), attributes.get("name", "").strip()
-            if not index.isdigit() or int(index) < 1:
-                raise InputError(f"{where}: grid_field index {index!r} is not a number from 1 on")
-            if title in self.grid_fields:
-                raise InputError(f"{where}: field {title} occurs twice")
-            self.grid_fields[title] = (int(index) - 1, attributes.get("units", "").strip(), line)
-        elif name == "grid_data":
-            self.in_data, self.data_line = True, line
-            for titles in (("LON",), ("LAT",), self.needed):
-                if not set(titles) & set(self.grid_fields):
-                    have = ", ".join(self.grid_fields) or "none"
-                    raise InputError(
-                        f"{self.source}, line {line}: there is no field {' or '.join(titles)}; the "
-                        f"fields are {have}"
-                    )
-
-    def text(self, part: str) -> None:
-        """Process a piece of text."""
-        if not self.in_data:
-            return
-        # a number may be cut where the parser's buffer ends
-        buffer = self.rest + part
-        cut = max(buffer.rfind(" "), buffer.rfind("\n"), buffer.rfind("\t"), buffer.rfind("\r"))
-        self.rest = buffer[cut + 1 :]
-        self._take(buffer[: cut + 1])
-
-    def end(self, name: str, _line: int) -> None:
-        """Process an end tag."""
-        if name == "grid_data":
-            self._take(self.rest)
-            self.rest, self.in_data = "", False
-
-    def _take(self, text: str) -> None:
-        words = text.split()
-        if not words:
-            return
-        try:
-            block = np.array(words, dtype=np.float64)
-        except ValueError:
-            raise InputError(self._bad_word(words)) from None
-        self.values += block.size
-        if self.values > MOST_NODES * max(len(self.grid_fields), 1):
-            raise InputError(f"{self.source}: the grid has more than {MOST_NODES} nodes")
-        self.blocks.append(block)
-
-    def _bad_word(self, words: list[str]) -> str:
-        for i, word in enumerate(words):
-            try:
-                float(word)
-            except ValueError:
-                row = (self.values + i) // max(len(self.grid_fields), 1) + 1
-                return f"{self.source}, node {row} of grid_data: {word[:40]!r} is not a number"
-        raise AssertionError("every word is a number")
-
-    def read(
-        self, allow_partial: bool
-    ) -> tuple[ShakeMapEvent, dict[str, FloatArray], int, int, list[str]]:
-        """Return event, fields by name, columns, rows and warnings."""
-        parse_xml(self.source, "a ShakeMap grid", start=self.start, end=self.end, text=self.text)
-        if not self.is_grid:
-            raise InputError(f"{self.source}: not a ShakeMap grid: there is no shakemap_grid")
-        if not self.blocks:
-            raise InputError(f"{self.source}: there is no grid_data")
-        warnings: list[str] = []
-        width = len(self.grid_fields)
-        highest = max(place for place, _, _ in self.grid_fields.values()) + 1
-        if highest != width:
-            raise InputError(
-                f"{self.source}: the fields have indices up to {highest} but there are {width}"
-            )
-        values = np.concatenate(self.blocks)
-        if values.size % width:
-            raise InputError(
-                f"{self.source}, line {self.data_line}: grid_data has {values.size} numbers, not "
-                f"a multiple of the {width} fields: a row is truncated or a field is missing"
-            )
-        table = values.reshape(-1, width)
-        columns, rows = (self._count(name) for name in ("nlon", "nlat"))
-        if table.shape[0] != columns * rows:
-            message = (
-                f"{self.source}: grid_data has {table.shape[0]} nodes, grid_specification says "
-                f"{columns} x {rows} = {columns * rows}"
-            )
-            if not allow_partial:
-                text = f"{message}: with allow_partial it is read as it is"
-                raise InputError(text, fields=("allow_partial",))
-            warnings.append(Diagnostic(f"{message}: read as it is", "incomplete_map"))
-        fields = {
-            "lon": self._degrees(table, "LON", 180.0),
-            "lat": self._degrees(table, "LAT", 90.0),
-        }
-        for title in _FIELDS:
-            if title in self.grid_fields:
-                fields[_FIELDS[title][0]] = self._field(table, title, warnings)
-        unknown = int(np.isnan(np.sum([*fields.values()], axis=0)).sum())
-        if unknown:
-            text = (
-                f"{self.source}: {unknown:,} of {table.shape[0]:,} nodes of grid_data have no "
-                "number (NaN) in a field that is read: they are left out"
-            )
-            warnings.append(Diagnostic(text, "incomplete_map"))
-        return self._event(), fields, columns, rows, warnings
-
-    def _count(self, name: str) -> int:
-        text = self.size.get(name, "")
-        if not text.strip().isdigit() or int(text) < 1:
-            raise InputError(f"{self.source}: grid_specification {name} = {text!r} is not a number")
-        return int(text)
-
-    def _degrees(self, table: FloatArray, title: str, limit: float) -> FloatArray:
-        values = table[:, self.grid_fields[title][0]].copy()
-        off = ~(np.abs(values) <= limit)
-        if off.any():
-            node = int(np.flatnonzero(off)[0])
-            raise InputError(
-                f"{self.source}, node {node + 1} of grid_data: {title} = {values[node]:g} must be "
-                f"between -{limit:g} and {limit:g}"
-            )
-        return values
-
-    def _field(self, table: FloatArray, title: str, warnings: list[str]) -> FloatArray:
-        place, unit, line = self.grid_fields[title]
-        name, units = _FIELDS[title]
-        if not unit:
-            usual = next(iter(units))
-            text = f"{self.source}, line {line}: {title} has no unit: assumed to be {usual}"
-            warnings.append(Diagnostic(text, "unit_assumed"))
-            unit = usual
-        if unit not in units:
-            raise InputError(
-                f"{self.source}, line {line}: {title} in {unit!r} is unknown: use one of "
-                f"{', '.join(units)}"
-            )
-        values = units[unit] * table[:, place]
-        bad = (values < 0.0) | np.isinf(values)
-        if bad.any():
-            node = int(np.flatnonzero(bad)[0])
-            raise InputError(
-                f"{self.source}, node {node + 1} of grid_data: {title} = {table[node, place]:g}: "
-                "a finite number, not below zero, is wanted"
-            )
-        largest = MEASURES[name].largest if name in MEASURES else None
-        if (values > (largest or _MOST_STD)).any():
-            text = f"{self.source}: {title} reaches {np.nanmax(table[:, place]):g} {unit}"
-            warnings.append(Diagnostic(f"{text}: is that its unit?", "suspicious_value"))
-        return values
-
-    def _event(self) -> ShakeMapEvent:
-        def number(name: str) -> float | None:
-            try:
-                value = float(self.event.get(name, ""))
-            except ValueError:
-                return None
-            return value if np.isfinite(value) else None
-
-        return ShakeMapEvent(
-            event_id=self.event.get("event_id", self.root.get("event_id", "")),
-            magnitude=number("magnitude"),
-            depth_km=number("depth"),
-            lat=number("lat"),
-            lon=number("lon"),
-            time=self.event.get("event_timestamp", ""),
-            description=self.event.get("event_description", ""),
-            version=self.root.get("code_version", ""),
-        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -264,7 +43,9 @@ class ShakeMapGrid:
     """Nodes of a ShakeMap, rows from west to east, north to south.
 
     Args:
-        event: the earthquake.
+        event: event_id, event (description), magnitude and time under the keys of the JSON
+            contract; None where the file has no value.
+        epicentre: longitude and latitude [deg]; None where the file has none.
         lon: longitudes [deg], shape (n,).
         lat: latitudes [deg], shape (n,).
         measures: what the map holds of PGV [m/s], PGA and spectral accelerations [g] by their
@@ -275,7 +56,8 @@ class ShakeMapGrid:
         warnings: what was noticed on reading.
     """
 
-    event: ShakeMapEvent
+    event: Mapping[str, Any]
+    epicentre: tuple[float, float] | None
     lon: FloatArray
     lat: FloatArray
     measures: dict[str, FloatArray]
@@ -293,6 +75,183 @@ class ShakeMapGrid:
     def is_complete(self) -> NDArray[np.bool_]:
         """Mask of the nodes with a number in every field that is read, shape (n,)."""
         return has_all_fields(self.measures, self.std_ln)
+
+
+Place = tuple[int, str, int]
+"""Column of a field, its unit, and the line that states them."""
+
+
+def _read_grid(
+    path: str | os.PathLike[str], needed: Sequence[str], *, allow_partial: bool
+) -> ShakeMapGrid:
+    """Return a grid or its uncertainty.
+
+    Args:
+        needed: fields of which one is required in addition to LON and LAT.
+    """
+    source = str(path)
+    tags, positions, table = _parse_grid(source, needed)
+    specification = tags.get("grid_specification", {})
+    size = {}
+    for name in ("nlon", "nlat"):
+        text = specification.get(name, "")
+        if not text.strip().isdigit() or int(text) < 1:
+            raise InputError(f"{source}: grid_specification {name} = {text!r} is not a number")
+        size[name] = int(text)
+    columns, rows = size.values()
+    warnings: list[str] = []
+    if len(table) != columns * rows:
+        message = (
+            f"{source}: grid_data has {len(table)} nodes, grid_specification says "
+            f"{columns} x {rows} = {columns * rows}"
+        )
+        if not allow_partial:
+            text = f"{message}: with allow_partial it is read as it is"
+            raise InputError(text, fields=("allow_partial",))
+        warnings.append(Diagnostic(f"{message}: read as it is", "incomplete_map"))
+    coordinates = []
+    for title, limit in (("LON", 180.0), ("LAT", 90.0)):
+        values = table[:, positions[title][0]].copy()
+        off = np.flatnonzero(~(np.abs(values) <= limit))
+        if off.size:
+            raise InputError(
+                f"{source}, node {off[0] + 1} of grid_data: {title} = {values[off[0]]:g} must be "
+                f"between -{limit:g} and {limit:g}"
+            )
+        coordinates.append(values)
+    measures: dict[str, FloatArray] = {}
+    std_ln: dict[str, FloatArray] = {}
+    for prefix, group in (("", measures), ("STD", std_ln)):
+        for title, (name, units) in _MEASURES.items():
+            if (place := positions.get(prefix + title)) is not None:
+                largest = None if prefix else MEASURES[name].largest
+                # the standard deviation of a logarithm does not depend on the unit inside
+                of_logs = {f"ln({unit})": 1.0 for unit in units}
+                group[name] = _field(
+                    source, table, prefix + title, place, of_logs if prefix else units,
+                    largest or _MOST_STD, warnings,
+                )  # fmt: skip
+    fields = (*coordinates, *measures.values(), *std_ln.values())
+    unknown = int(np.isnan(np.sum(fields, axis=0)).sum())
+    if unknown:
+        text = (
+            f"{source}: {unknown:,} of {len(table):,} nodes of grid_data have no "
+            "number (NaN) in a field that is read: they are left out"
+        )
+        warnings.append(Diagnostic(text, "incomplete_map"))
+    root, about = tags["shakemap_grid"], tags.get("event", {})
+
+    def number(name: str) -> float | None:
+        try:
+            value = float(about.get(name, ""))
+        except ValueError:
+            return None
+        return value if np.isfinite(value) else None
+
+    event = {
+        "event_id": about.get("event_id", root.get("event_id", "")),
+        "event": about.get("event_description", ""),
+        "magnitude": number("magnitude"),
+        "time": about.get("event_timestamp", ""),
+    }
+    x, y = number("lon"), number("lat")
+    lon, lat = coordinates
+    return ShakeMapGrid(
+        event, None if x is None or y is None else (x, y), lon, lat, measures, std_ln, columns,
+        rows, tuple(warnings),
+    )  # fmt: skip
+
+
+def _parse_grid(
+    source: str, needed: Sequence[str]
+) -> tuple[dict[str, Mapping[str, str]], dict[str, Place], FloatArray]:
+    """Return the attributes by tag, the positions of the fields, and grid_data by node."""
+    tags: dict[str, Mapping[str, str]] = {}
+    positions: dict[str, Place] = {}
+    blocks: list[FloatArray] = []
+    in_data, rest, data_line, count = False, "", 0, 0
+    for kind, text, attributes, line in xml_events(source, "a ShakeMap grid"):
+        if kind == "start":
+            tags[text] = attributes
+        if kind == "start" and text == "grid_field":
+            where = f"{source}, line {line}"
+            index, title = attributes.get("index", ""), attributes.get("name", "").strip()
+            if not index.isdigit() or int(index) < 1:
+                raise InputError(f"{where}: grid_field index {index!r} is not a number from 1 on")
+            if title in positions:
+                raise InputError(f"{where}: field {title} occurs twice")
+            positions[title] = int(index) - 1, attributes.get("units", "").strip(), line
+        elif kind == "start" and text == "grid_data":
+            in_data, data_line = True, line
+            for titles in (("LON",), ("LAT",), needed):
+                if not set(titles) & set(positions):
+                    have = ", ".join(positions) or "none"
+                    raise InputError(
+                        f"{source}, line {line}: there is no field {' or '.join(titles)}; the "
+                        f"fields are {have}"
+                    )
+        elif in_data and (kind == "text" or (kind, text) == ("end", "grid_data")):
+            in_data = kind == "text"
+            # a number may be cut where the parser's buffer ends
+            data = rest + text if in_data else f"{rest} "
+            words = data.split()
+            rest = "" if data[-1].isspace() else words.pop()
+            try:
+                blocks.append(np.array(words, dtype=np.float64))
+            except ValueError:
+                bad = next(i for i, word in enumerate(words) if not is_numeral(word))
+                raise InputError(
+                    f"{source}, node {(count + bad) // max(len(positions), 1) + 1} of grid_data: "
+                    f"{words[bad][:40]!r} is not a number"
+                ) from None
+            count += len(words)
+            if count > MOST_NODES * max(len(positions), 1):
+                raise InputError(f"{source}: the grid has more than {MOST_NODES} nodes")
+    if "shakemap_grid" not in tags:
+        raise InputError(f"{source}: not a ShakeMap grid: there is no shakemap_grid")
+    if not count:
+        raise InputError(f"{source}: there is no grid_data")
+    width, highest = len(positions), max(place for place, _, _ in positions.values()) + 1
+    if highest != width:
+        raise InputError(f"{source}: the fields have indices up to {highest} but there are {width}")
+    if count % width:
+        raise InputError(
+            f"{source}, line {data_line}: grid_data has {count} numbers, not "
+            f"a multiple of the {width} fields: a row is truncated or a field is missing"
+        )
+    return tags, positions, np.concatenate(blocks).reshape(-1, width)
+
+
+def _field(
+    source: str,
+    table: FloatArray,
+    title: str,
+    place: Place,
+    units: Mapping[str, float],
+    largest: float,
+    warnings: list[str],
+) -> FloatArray:
+    """Return a field in our unit, after a check of its unit and its numbers."""
+    column, unit, line = place
+    if not unit:
+        unit = next(iter(units))
+        text = f"{source}, line {line}: {title} has no unit: assumed to be {unit}"
+        warnings.append(Diagnostic(text, "unit_assumed"))
+    if unit not in units:
+        raise InputError(
+            f"{source}, line {line}: {title} in {unit!r} is unknown: use one of {', '.join(units)}"
+        )
+    values = units[unit] * table[:, column]
+    bad = np.flatnonzero((values < 0.0) | np.isinf(values))
+    if bad.size:
+        raise InputError(
+            f"{source}, node {bad[0] + 1} of grid_data: {title} = {table[bad[0], column]:g}: "
+            "a finite number, not below zero, is wanted"
+        )
+    if (values > largest).any():
+        text = f"{source}: {title} reaches {np.nanmax(table[:, column]):g} {unit}"
+        warnings.append(Diagnostic(f"{text}: is that its unit?", "suspicious_value"))
+    return values
 
 
 def read_shakemap(
@@ -320,48 +279,29 @@ def read_shakemap(
             f"{path} is HDF5 (shake_result.hdf), which is not supported: use grid.xml and "
             "uncertainty.xml of the same ShakeMap"
         )
-    event, fields, columns, rows, warnings = GridReading(str(path), tuple(_MEASURES)).read(
-        allow_partial
-    )
-    grid = ShakeMapGrid(
-        event=event,
-        lon=fields["lon"],
-        lat=fields["lat"],
-        measures={name: fields[name] for name, _ in _MEASURES.values() if name in fields},
-        std_ln=_deviations(fields),
-        columns=columns,
-        rows=rows,
-        warnings=tuple(warnings),
-    )
-    return grid if uncertainty is None else _with_uncertainty(grid, uncertainty, allow_partial)
-
-
-def _deviations(fields: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
-    return {n.removeprefix(_STD): values for n, values in fields.items() if n.startswith(_STD)}
-
-
-def _with_uncertainty(
-    grid: ShakeMapGrid, path: str | os.PathLike[str], allow_partial: bool
-) -> ShakeMapGrid:
-    event, fields, _, _, warnings = GridReading(
-        str(path), tuple(f"STD{title}" for title in _MEASURES)
-    ).read(allow_partial)
-    if event.event_id and grid.event.event_id and event.event_id != grid.event.event_id:
+    grid = _read_grid(path, tuple(_MEASURES), allow_partial=allow_partial)
+    if uncertainty is None:
+        return grid
+    needed = tuple(f"STD{title}" for title in _MEASURES)
+    other = _read_grid(uncertainty, needed, allow_partial=allow_partial)
+    ids = [shaken.event["event_id"] for shaken in (other, grid)]
+    if all(ids) and ids[0] != ids[1]:
         raise InputError(
-            f"{path}: is of event {event.event_id!r}, the grid of {grid.event.event_id!r}: name "
-            "the uncertainty of the same map"
+            f"{uncertainty}: is of event {ids[0]!r}, the grid of {ids[1]!r}: name the uncertainty "
+            "of the same map"
         )
-    same = fields["lon"].size == grid.lon.size
-    same = same and np.allclose(fields["lon"], grid.lon, rtol=0.0, atol=1e-4)
-    if not (same and np.allclose(fields["lat"], grid.lat, rtol=0.0, atol=1e-4)):
+    if other.lon.size != grid.lon.size or not all(
+        np.allclose(ours, theirs, rtol=0.0, atol=1e-4)
+        for ours, theirs in ((other.lon, grid.lon), (other.lat, grid.lat))
+    ):
         raise InputError(
-            f"{path}: has {fields['lon'].size} nodes that are not those of the grid "
+            f"{uncertainty}: has {other.lon.size} nodes that are not those of the grid "
             f"({grid.lon.size}): name the uncertainty of the same map"
         )
     return replace(
         grid,
-        std_ln={**grid.std_ln, **_deviations(fields)},
-        warnings=(*grid.warnings, *warnings),
+        std_ln={**grid.std_ln, **other.std_ln},
+        warnings=(*grid.warnings, *other.warnings),
     )
 
 

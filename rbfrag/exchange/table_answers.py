@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from itertools import islice
@@ -16,24 +16,42 @@ from numpy.typing import NDArray
 from rbfrag.errors import InputError
 from rbfrag.exchange.block_rows import NO_BLOCK, PLACE
 from rbfrag.exchange.block_table import SHAKING_TEXTS, TEXTS, BlockTable, opened_table
-from rbfrag.exchange.excel_text import as_text, as_written, changed_texts, formula_warnings
+from rbfrag.exchange.tables.csv_file import as_text, as_written, changed_texts, formula_warnings
 from rbfrag.exchange.tables.files import table_path, table_writer, write_csv_notes
 from rbfrag.exchange.tables.parts import TablePart, Write
 from rbfrag.files import as_path, written_whole
-from rbfrag.fragility.invalid_rows import FIRST, describe_invalid, reject
 from rbfrag.fragility.joint import UNKNOWN, Placement, count_moments, count_quantiles
 from rbfrag.fragility.measures import MEASURES
 from rbfrag.fragility.model_selection import find_model
 from rbfrag.fragility.prediction_array import PredictionArray
+from rbfrag.fragility.validation import FIRST, describe_invalid, reject
 from rbfrag.question.components import SINGLE_COMPONENT, component_named
-from rbfrag.question.keywords import LEVEL
-from rbfrag.question.question import OF_BOUND, ask, with_drained_bound
+from rbfrag.question.drained_bound import OF_BOUND, with_drained_bound
+from rbfrag.question.keywords import LEVEL, reject_inverse
+from rbfrag.question.measurement import (
+    TOGETHER,
+    USUAL,
+)
+from rbfrag.question.measurement_draws import (
+    encoded,
+    source_of,
+)
+from rbfrag.question.question import ask
 from rbfrag.question.shape_validation import PLANE_TEXTS
 from rbfrag.results.diagnostic import Diagnostic, codes_by_row, diagnostics
 from rbfrag.results.numbers import count_of, interval, percent, rounded
 from rbfrag.results.result import Result, TextLine, TextTable
 from rbfrag.solver.results import FloatArray
-from rbfrag.vocabulary.quantities import BLOCK, BY_ROW, ROW, SCATTER, SHAKING, column_of
+from rbfrag.vocabulary.quantities import (
+    BLOCK,
+    BY_ROW,
+    MEASURED,
+    ROW,
+    SCATTER,
+    SHAKING,
+    column_of,
+    measured_by,
+)
 
 _NUMBERS = ("probability", "ci_low", "ci_high", "event_low", "event_high")
 
@@ -45,6 +63,9 @@ _SHAKING, _SCATTER = SHAKING, frozenset(SCATTER)
 OF_UNCERTAIN = "block_sd"
 """The column that is appended too where blocks are uncertain."""
 
+OF_STATED = tuple(f"as_stated_{name}" for name in OF_BOUND)
+"""The columns that are appended too where errors of measurement are given."""
+
 OF_DRAINED = tuple(f"drained_{name}" for name in OF_BOUND)
 """The columns that are appended too where water stands behind blocks."""
 
@@ -52,7 +73,7 @@ MOST_PAIRED = 700
 """Rows that tell what pairs of blocks share; of a longer table so many drawn at random."""
 
 MOST_LISTED = 10_000
-"""So many answers are listed; a file has them all."""
+"""Maximum number of rows listed; the output file has all."""
 
 SHOWN = 40
 """Rows that a terminal shows."""
@@ -123,8 +144,22 @@ class TableAnswer(Result):
     def tables(self, *, verbose: bool = False) -> Iterator[TextTable]:
         """Yield the answers of the first rows; if verbose all that are listed, and the totals."""
         if self.blocks is not None:
-            shown = self.blocks if verbose else self.blocks[:SHOWN]
-            yield TextTable.of_rows([_row_in_short(answer) for answer in shown])
+            words = {"probability": "probability", "drained_probability": "drained"}
+            rows = []
+            for row in self.blocks if verbose else self.blocks[:SHOWN]:
+                ends = row["ci_low"], row["ci_high"]
+                shown = {
+                    word: None if row[name] is None else percent(row[name])
+                    for name, word in words.items()
+                    if name in row
+                }
+                rows.append({
+                    "block": row["block_id"], "kind": row["kind"], "mode": row["mode"],
+                    "probability": shown.pop("probability"),
+                    "interval": None if None in ends else interval(*ends),
+                    **shown, "reason": row["reason"],
+                })  # fmt: skip
+            yield TextTable.of_rows(rows)
         if verbose:
             totals = self.as_dict()
             yield TextTable(
@@ -139,26 +174,6 @@ class TableAnswer(Result):
         return values
 
 
-def _row_in_short(row: Mapping[str, Any]) -> dict[str, object]:
-    """Return the cells of a row's answer that are shown on a terminal."""
-    ends = row["ci_low"], row["ci_high"]
-    columns = {"probability": "probability", "drained_probability": "drained"}
-    shown = {
-        word: None if row[name] is None else percent(row[name])
-        for name, word in columns.items()
-        if name in row
-    }
-    return {
-        "block": row["block_id"],
-        "kind": row["kind"],
-        "mode": row["mode"],
-        "probability": shown.pop("probability"),
-        "interval": None if None in ends else interval(*ends),
-        **shown,
-        "reason": row["reason"],
-    }
-
-
 def predict_table(
     source: str | PathLike[str],
     target: str | PathLike[str] | None = None,
@@ -168,6 +183,7 @@ def predict_table(
     sheet: str | None = None,
     ignore_columns: Sequence[str] = (),
     excel_text: bool = False,
+    sensitivity: bool = False,
     remarks: Sequence[str] = (),
     **question: Any,
 ) -> TableAnswer:
@@ -186,6 +202,8 @@ def predict_table(
         sheet: of a workbook, the name of the sheet; None for the first.
         ignore_columns: columns to ignore, whatever they are called.
         excel_text: write texts that spreadsheets take for formulas with an apostrophe (CSV).
+        sensitivity: append columns with P at usual errors of each measured field, and with the
+            sources of the uncertainty where standard deviations are given.
         remarks: warnings about the options, which go before those of the answer.
         question: ``rotation_deg``, ``component``, ``mechanism``, ``model``, ``level`` and ``db`` of
             :func:`rbfrag.predict`.
@@ -199,11 +217,13 @@ def predict_table(
             "sites is for a single block: use the column site_id in a table",
             fields=("sites",),
         )
+    reject_inverse(question)
     origin = as_path(source, "source", "a table of blocks")
     goal = None if target is None else table_path(target)
     if goal is not None and origin.exists() and goal.exists() and origin.samefile(goal):
         raise InputError(f"out {goal} is the input table: choose another file", fields=("out",))
-    read = (*BLOCK, *SHAKING, *BY_ROW, "count")
+    read = (*BLOCK, *MEASURED, *SHAKING, *BY_ROW, "count")
+    inputs = {name: encoded(name, value) for name, value in inputs.items()}
     counts = np.zeros(3, dtype=np.int64)
     together: list[tuple[FloatArray, FloatArray, NDArray[np.object_], FloatArray]] = []
     rejected: dict[str, str] = {}
@@ -222,6 +242,12 @@ def predict_table(
         table.check(inputs, kind)
         uncertain = not _SCATTER.isdisjoint((*table.header.columns, *inputs))
         columns: tuple[str, ...] = (*ANSWERS, OF_UNCERTAIN) if uncertain else ANSWERS
+        fields = {*table.header.columns, *inputs}
+        is_scenario = "rjb_km" in fields or question.get("gmm") is not None
+        columns += OF_STATED if is_scenario or not fields.isdisjoint(MEASURED) else ()
+        if is_scenario:
+            fields.add("gmm_sigma")
+        columns += (*_of_sensitivity(fields), *_of_uncertainty(fields)) if sensitivity else ()
         columns += OF_DRAINED if "water_m" in (*table.header.columns, *inputs) else ()
         if goal is None:
             write = _listed(table, columns, rows)
@@ -229,8 +255,13 @@ def predict_table(
             partial = stack.enter_context(written_whole(goal))
             write = _written(table, columns, partial, stack, formulas, notes, excel_text=excel_text)
         for part in table.parts:
-            predicted, answer, count = _answer(table, part, inputs, kind, question, empty)
-            by_row += _in_table(predicted.warnings, int(counts[0]))
+            predicted, answer, count = _answer(
+                table, part, inputs, kind, question, empty, sensitivity=sensitivity
+            )
+            by_row += [  # by the rows of the table
+                warning.replaced(rows=np.asarray(warning.rows, dtype=np.intp) + int(counts[0]))
+                for warning in diagnostics(predicted.warnings)
+            ]
             write(part, answer)
             for name, words in chosen.items():
                 names = getattr(predicted, name)
@@ -251,7 +282,7 @@ def predict_table(
         if not answered:
             reject(str(origin), [*rejected], [*rejected.values()], total)
         table.check_read(inputs, chosen["read"])
-        used = {*chosen.pop("read"), *_SHAKING, *texts, *PLACE, *ROW}
+        used = {*chosen.pop("read"), *MEASURED, *_SHAKING, *texts, *PLACE, *ROW}
         missing = describe_invalid(total - answered, total, [*rejected], [*rejected.values()])
         notes += diagnostics(
             remarks,
@@ -273,14 +304,6 @@ def predict_table(
         blocks=rows if goal is None else None,
         warnings=diagnostics(notes),
     )
-
-
-def _in_table(warnings: Sequence[str], start: int) -> list[Diagnostic]:
-    """Return the warnings of a part of a table, whose first row is `start`, with its rows."""
-    return [
-        warning.replaced(rows=np.asarray(warning.rows, dtype=np.intp) + start)
-        for warning in diagnostics(warnings)
-    ]
 
 
 def _total_failures(
@@ -332,6 +355,8 @@ def _answer(
     kind: str | None,
     question: Mapping[str, Any],
     empty: set[str],
+    *,
+    sensitivity: bool,
 ) -> tuple[PredictionArray, dict[str, NDArray[Any]], FloatArray]:
     """Return the answers for rows, their columns, and the number of blocks of each row."""
     values, faults = table.numbers(part)
@@ -351,6 +376,10 @@ def _answer(
         else:
             # an option holds for the rows whose cell is empty
             inputs[name] = np.where(np.isnan(column), common_fields.get(name, np.nan), column)
+    for name in inputs.keys() & {*MEASURED}:
+        # a negative number is a fraction of its field
+        error, value = inputs[name], inputs.get(measured_by(name), np.nan)
+        inputs[name] = np.where(error < 0.0, -error * np.asarray(value), error)
     for name in PLANE_TEXTS:
         if (cells := table.text(part, name)) is not None:
             inputs[name] = np.array(
@@ -358,8 +387,11 @@ def _answer(
             )
     for name in SHAKING_TEXTS:
         if (cells := table.text(part, name)) is not None and any(cells):
-            if name == "component":
-                faults = _wrong_components(cells) | faults
+            for i, cell in enumerate(cells if name == "component" else ()):
+                try:
+                    component_named(cell or SINGLE_COMPONENT)
+                except InputError as error:
+                    faults.setdefault(i, str(error))
             of_all = question.get(name)
             filled = ["" if i in faults else cell or of_all for i, cell in enumerate(cells)]
             question = {**question, name: filled}
@@ -367,7 +399,10 @@ def _answer(
     requested = kind if kinds is None else [row_kind or kind for row_kind in kinds]
     with table.named():
         predicted = with_drained_bound(
-            lambda rows: ask(rows, kind=requested, mode=modes, rows=True, **question), inputs
+            lambda rows: ask(
+                rows, kind=requested, mode=modes, rows=True, sensitivity=sensitivity, **question
+            ),
+            inputs,
         )
     assert isinstance(predicted, PredictionArray)
     answer: dict[str, NDArray[Any]] = {
@@ -382,9 +417,18 @@ def _answer(
     sd = predicted.block_sd
     answer[OF_UNCERTAIN] = np.zeros(predicted.probability.shape) if sd is None else sd
     bound = predicted.drained or {}
+    nominal = predicted.as_stated or {n: getattr(predicted, n) for n in OF_BOUND}
     answer |= {f"drained_{n}": bound.get(n, np.full(count.size, np.nan)) for n in OF_BOUND}
+    answer |= {f"as_stated_{n}": nominal[n].copy() for n in OF_BOUND}
     bad = [*faults]
-    for name in (*_NUMBERS, OF_UNCERTAIN, *OF_DRAINED):
+    more = {
+        f"{key}_{n}": column
+        for key in ("sensitivity", "uncertainty")
+        for n, column in (getattr(predicted, key) or {}).items()
+    }
+    empty_column = np.full(count.size, np.nan)
+    answer |= {n: more.get(n, empty_column).copy() for n in _ON_REQUEST}
+    for name in (*_NUMBERS, OF_UNCERTAIN, *OF_STATED, *OF_DRAINED, *_ON_REQUEST):
         answer[name][bad] = np.nan
     answer["in_domain"][bad] = False
     answer["how"][bad] = ""
@@ -393,15 +437,20 @@ def _answer(
     return predicted, answer, np.where(is_integer, count, 1.0)
 
 
-def _wrong_components(components: Sequence[str]) -> dict[int, str]:
-    """Return the errors of rows whose horizontal component is unknown, by index."""
-    faults = {}
-    for i, name in enumerate(components):
-        try:
-            component_named(name or SINGLE_COMPONENT)
-        except InputError as error:
-            faults[i] = str(error)
-    return faults
+def _of_sensitivity(fields: Collection[str]) -> tuple[str, ...]:
+    """Return the columns of P at usual errors of those of the fields that are measured."""
+    rectangle = {"beta_deg"} if "height_m" in fields else set()
+    names = (name for name in USUAL if name in {*fields} | rectangle)
+    return tuple(f"sensitivity_{name}_{end}" for name in names for end in ("low", "high"))
+
+
+def _of_uncertainty(fields: Collection[str]) -> tuple[str, ...]:
+    """Return the columns of the sources of uncertainty of those of the fields that are errors."""
+    sources = [source_of(name) for name in MEASURED if name in fields]
+    return tuple(f"uncertainty_{n}" for n in (*sources, "fragility", TOGETHER) if sources)
+
+
+_ON_REQUEST = (*_of_sensitivity(USUAL), *_of_uncertainty(MEASURED))
 
 
 def _written(
@@ -418,7 +467,7 @@ def _written(
     doubled = next((name for name in table.file.header if table.file.header.count(name) > 1), None)
     if doubled is not None:
         raise InputError(f"{table.name}: the column {doubled} occurs twice")
-    written = (*ANSWERS, OF_UNCERTAIN, *OF_DRAINED)
+    written = (*ANSWERS, OF_UNCERTAIN, *OF_STATED, *OF_DRAINED, *_ON_REQUEST)
     header = [name for name in table.file.header if name not in written]
     write = table_writer(
         partial, header, answers, numeric=table.numeric, stack=stack, dialect=table.file.dialect,

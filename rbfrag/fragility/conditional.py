@@ -14,7 +14,7 @@ import numpy as np
 
 from rbfrag.db.shock_pairs import ShockEnd, StoredShockPair
 from rbfrag.fragility.confidence import ParameterErrors, packed, quantiles_of
-from rbfrag.fragility.fit.clusters import cr3
+from rbfrag.fragility.fit.result import cr3
 from rbfrag.fragility.method import SINGLE
 from rbfrag.solver.results import Outcome
 

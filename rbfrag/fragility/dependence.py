@@ -16,10 +16,10 @@ from rbfrag.errors import InputError
 
 if TYPE_CHECKING:
     import numpy as np
-    from numpy.typing import ArrayLike, NDArray
+    from numpy.typing import NDArray
 
-_ROOT_HALF = math.sqrt(0.5)
-_ROOT_TWO_PI = math.sqrt(2.0 * math.pi)
+ROOT_HALF = math.sqrt(0.5)
+ROOT_TWO_PI = math.sqrt(2.0 * math.pi)
 
 
 @dataclass(frozen=True)
@@ -94,61 +94,10 @@ class Dependence:
         component = same_component * (symmetric + antisymmetric) * np.exp(-distance_y / self.l_y)
         return np.asarray(shared * np.exp(-distance_l / self.l_e) + component)
 
-    def correlation(
-        self,
-        l: ArrayLike,  # noqa: E741  the symbol of the formula
-        ln_y: ArrayLike,
-        earthquake: ArrayLike,
-        site: ArrayLike,
-        component: ArrayLike,
-        polarity: ArrayLike,
-    ) -> NDArray[np.float64]:
-        """Return the correlation matrix R of the blocks, shape (n, n), with 1 on the diagonal.
-
-        Args:
-            l: ln of the frequency parameter p [1/s], shape (n,).
-            ln_y: ln of the toppling velocity y = k_r g/p [m/s], shape (n,).
-            earthquake: labels of earthquakes, shape (n,).
-            site: labels of sites within an earthquake, shape (n,).
-            component: labels of horizontal components within a site, shape (n,).
-            polarity: +1 or -1, the side of the component that the block faces, shape (n,).
-
-        Raises:
-            InputError: a polarity is neither +1 nor -1 (an unknown azimuth has no single R).
-        """
-        import numpy as np
-
-        side = np.asarray(polarity, dtype=np.float64)
-        if not np.all(np.abs(side) == 1.0):
-            raise InputError(
-                "correlation needs polarities of +1 or -1: draw unknown azimuths first"
-            )
-
-        def equal(labels: ArrayLike) -> NDArray[np.bool_]:
-            array = np.asarray(labels)
-            return np.asarray(array[:, None] == array[None, :])
-
-        def apart(values: ArrayLike) -> NDArray[np.float64]:
-            array = np.asarray(values, dtype=np.float64)
-            return np.abs(array[:, None] - array[None, :])
-
-        together = equal(earthquake)
-        at_site = together & equal(site)
-        r = self.of_pairs(
-            apart(l),
-            apart(ln_y),
-            at_site,
-            at_site & equal(component),
-            np.multiply.outer(side, side),
-        )
-        r *= together
-        np.fill_diagonal(r, 1.0)
-        return r
-
 
 def normal_share(z: float) -> float:
     """Return Φ(z), the standard normal distribution function."""
-    return 0.5 * math.erfc(-z * _ROOT_HALF)
+    return 0.5 * math.erfc(-z * ROOT_HALF)
 
 
 def normal_quantile(probability: float) -> float:
@@ -166,8 +115,8 @@ def normal_quantile(probability: float) -> float:
         1.0 + t * (1.432788 + t * (0.189269 + t * 0.001308))
     ) - t
     for _ in range(60):
-        share = 0.5 * math.erfc(-z * _ROOT_HALF)
-        hazard = math.exp(-0.5 * z * z) / (_ROOT_TWO_PI * share)
+        share = 0.5 * math.erfc(-z * ROOT_HALF)
+        hazard = math.exp(-0.5 * z * z) / (ROOT_TWO_PI * share)
         step = (target - math.log(share)) / hazard
         step /= 1.0 - 0.5 * step * (z + hazard)
         z += step

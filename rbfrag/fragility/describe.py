@@ -5,21 +5,26 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from rbfrag.results.numbers import equals, with_interval
+from rbfrag.results.numbers import equals, exact_percent, interval, with_interval
 from rbfrag.vocabulary.quantities import (
     INTENSITY,
     JOINT,
+    MEASURED,
     MEASURES,
     NUMBERS,
     PLANES,
     QUANTITIES,
     SHAPE,
     SPACE,
+    measured_by,
     word_of,
 )
 
 if TYPE_CHECKING:
     from rbfrag.db.model_file import ModelRow
+
+_MOST_TOGETHER, _LEAST_SHARE = 0.3, 0.01
+"""Fraction of several sources together from which on none is listed, and the smallest listed."""
 
 _LONGEST_LABEL = 30
 """Letters of a label; a longer one gives way to the word of the field."""
@@ -71,6 +76,60 @@ def drained_bound(bound: Mapping[str, float | None]) -> str:
     ]
     p, low, high = (float(bound[name] or 0.0) for name in ("probability", "ci_low", "ci_high"))
     return f"{''.join(yields)}{equals('P', with_interval(p, low, high))}, without water pressure"
+
+
+def measured(name: str, error: float, *, relative: bool = False) -> str:
+    """Describe a field with an error of its measurement: "base dip ±2°", "width ±5 %"."""
+    if name in SPACE:
+        return f"{name} ±{error:.3g}°"
+    quantity = QUANTITIES[name]
+    noun, _, place = quantity.noun.partition(" of the ")
+    label = f"{place} {noun}" if place and " " not in place else quantity.noun
+    label = label if len(label) <= _LONGEST_LABEL else quantity.symbol or word_of(name)
+    if relative:
+        return f"{label} ±{exact_percent(float(f'{error:.3g}'))}"
+    return f"{label} ±{error:.3g} {quantity.unit}".replace(" deg", "°").rstrip()
+
+
+def sources(fractions: Sequence[Mapping[str, Any]], inputs: Mapping[str, Any]) -> str:
+    """Describe the sources of an interval: "base dip ±2° 70 %, fragility 3 %"; empty where most of
+    it comes from several together.
+
+    Args:
+        fractions: source and fraction of the variance.
+        inputs: the standard deviations by name, among others.
+    """
+    shares = {row["source"]: row["fraction"] for row in fractions}
+    if not shares or shares.pop("together") >= _MOST_TOGETHER:
+        return ""
+    errors = {measured_by(name): inputs[name] for name in MEASURED if name in inputs}
+    labels = {"gmm": f"ground-motion model σ_ln {inputs.get('gmm_sigma', 0.0):.2g}"}
+    return ", ".join(
+        f"{labels.get(name) or (measured(name, errors[name]) if name in errors else name)} "
+        f"{exact_percent(round(share, 2))}"
+        for name, share in shares.items()
+        if share >= _LEAST_SHARE
+    )
+
+
+def sensitivity(rows: Sequence[Mapping[str, Any]]) -> str:
+    """Describe P at usual measurement errors: "base dip ±2°: 1.3–47 %; width ±5 %: 9.4–23 %"."""
+    return "; ".join(
+        f"{measured(row['field'], row['step'], relative=row['step'] < 1.0)}: "
+        f"{interval(row['low'], row['high'])}"
+        for row in rows
+    )
+
+
+def solution(about: Mapping[str, Any]) -> str:
+    """Describe the value at which P is the target: "width 0.477 m (stated 0.4 m)"."""
+    name = about["field"]
+    label, value = labelled_value(name, about["value"])
+    text = f"{label} {value} (stated {labelled_value(name, about['stated'])[1]})"
+    if about["added_kr"] is None:
+        return text
+    force = f"a horizontal force of {about['added_kr']:.3f} of the weight (first estimate)"
+    return f"{text}: {force}"
 
 
 def at_sites(number: float) -> str:
@@ -183,3 +242,10 @@ def fitted_data(diagnostics: Mapping[str, Any]) -> str:
     recorded = diagnostics.get("recorded_events") != 0
     of = "earthquakes" if recorded else "synthetic pulses, which are not earthquakes"
     return f"fitted on {number:,} {data} of {events:,} {of}"
+
+
+def fitted_number(diagnostics: Mapping[str, Any]) -> int | None:
+    """Return the number of critical values, or else of outcomes, that a model was fitted to."""
+    critical, outcomes = (diagnostics.get(name) for name in ("n", "n_outcomes"))
+    number = critical or outcomes or critical
+    return None if number is None else int(number)

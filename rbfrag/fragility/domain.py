@@ -9,12 +9,13 @@ do not change when a motion is scaled and name what contradicts what; the distan
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from functools import partial
 from typing import Any, NamedTuple
 
 from rbfrag.errors import ModelError
+from rbfrag.fragility.confidence import packed
 from rbfrag.fragility.method import ArrayNamespace
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.results.numbers import exact_percent
@@ -32,12 +33,6 @@ def _name_of(value: str) -> str:
     if value not in MEASURES:
         return "block's p"
     return MEASURES[value].imt or MEASURES[value].title or QUANTITIES[value].symbol
-
-
-def _with_unit(value: str, number: float) -> str:
-    name = _name_of(value)
-    unit = QUANTITIES[value].unit if value in MEASURES else "1/s"
-    return f"a{'n' if name.startswith('SA') else ''} {name} of {number:.3g} {unit}"
 
 
 @dataclass(frozen=True)
@@ -70,41 +65,42 @@ class Ratio:
             return domain.get(self.name, (0.0, math.inf))
         return self.shipped[0] / MARGIN, self.shipped[1] * MARGIN
 
-    def _ranges(self, fitted: tuple[float, float] | None) -> tuple[str, str]:
-        """Describe the range: its source, its ends, and what lying outside means."""
-        if fitted is None and self.shipped is not None:
-            return (
-                f"more than a factor of {MARGIN:g} outside the {self.shipped[0]:.3g} to "
-                f"{self.shipped[1]:.3g}{self.unit} of the motions of the shipped reference",
-                "check the values",
-            )
-        low, high = fitted or (0.0, math.inf)
-        return (
-            f"outside the fitted {low:.2g} to {high:.2g}{self.unit}",
-            "the answer is an extrapolation",
-        )
-
     def contradiction(
-        self, values: Mapping[str, float], ratio: float, fitted: tuple[float, float] | None
+        self,
+        values: Mapping[str, float],
+        fitted: tuple[float, float] | None,
+        ratio: float | None = None,
     ) -> str:
         """Return the sentence for values whose ratio is outside its range.
 
         Args:
             fitted: range of the fitted motions; None where the shipped ones judge.
+            ratio: the ratio of these values; None for many values, which are not given.
         """
-        first, *rest = (_with_unit(name, values[name]) for name in self.of)
-        where, effect = self._ranges(fitted)
+        names = {value: _name_of(value) for value in self.of}
+        is_ratio = "is"
+        if ratio is not None:
+            is_ratio = f"is {ratio:.2g}{self.unit},"
+            names = {
+                value: f"a{'n' if name.startswith('SA') else ''} {name} of {values[value]:.3g} "
+                f"{QUANTITIES[value].unit if value in MEASURES else '1/s'}"
+                for value, name in names.items()
+            }
+        if fitted is None and self.shipped is not None:
+            where = (
+                f"more than a factor of {MARGIN:g} outside the {self.shipped[0]:.3g} to "
+                f"{self.shipped[1]:.3g}{self.unit} of the motions of the shipped reference: check "
+                "the values"
+            )
+        else:
+            low, high = fitted or (0.0, math.inf)
+            where = (
+                f"outside the fitted {low:.2g} to {high:.2g}{self.unit}: the answer is an "
+                "extrapolation"
+            )
+        first, *rest = names.values()
         return (
-            f"{first} is inconsistent with {' and '.join(rest)}: {self.symbol} is "
-            f"{ratio:.2g}{self.unit}, {where}: {effect}"
-        )
-
-    def in_general(self, fitted: tuple[float, float] | None) -> str:
-        """Return the sentence for many values; `fitted` as for :meth:`contradiction`."""
-        first, *rest = map(_name_of, self.of)
-        where, effect = self._ranges(fitted)
-        return (
-            f"{first} is inconsistent with {' and '.join(rest)}: {self.symbol} is {where}: {effect}"
+            f"{first} is inconsistent with {' and '.join(rest)}: {self.symbol} {is_ratio} {where}"
         )
 
 
@@ -112,69 +108,46 @@ def _over(name: str, factor: float, other: str, values: Mapping[str, Any]) -> An
     return values[name] * factor / values[other]
 
 
-def _sa_ratios() -> tuple[Ratio, ...]:
-    result = []
-    for period, name in SPECTRAL.items():
-        label = f"SA({period:.1f})"
-        to_velocity = STANDARD_GRAVITY_M_S2 * period / (2.0 * math.pi)
-        result += [
-            Ratio(
-                f"v{name[2:4]}_over_pgv",
-                f"{label}·g·T/2π over PGV",
-                "",
-                (name, "pgv_m_s"),
-                partial(_over, name, to_velocity, "pgv_m_s"),
-            ),
-            Ratio(
-                f"{name[:4]}_over_pga",
-                f"{label}/PGA",
-                "",
-                (name, "pga_g"),
-                partial(_over, name, 1.0, "pga_g"),
-            ),
-        ]
-    return tuple(result)
+def _sa_ratios(name: str, period_s: float) -> tuple[Ratio, Ratio]:
+    """Return SA(T) as a velocity over PGV, and over PGA."""
+    label = f"SA({period_s:.1f})"
+    to_velocity = STANDARD_GRAVITY_M_S2 * period_s / (2.0 * math.pi)
+    return (
+        Ratio(
+            f"v{name[2:4]}_over_pgv", f"{label}·g·T/2π over PGV", "", (name, "pgv_m_s"),
+            partial(_over, name, to_velocity, "pgv_m_s"),
+        ),
+        Ratio(
+            f"{name[:4]}_over_pga", f"{label}/PGA", "", (name, "pga_g"),
+            partial(_over, name, 1.0, "pga_g"),
+        ),
+    )  # fmt: skip
 
 
 RATIOS: tuple[Ratio, ...] = (
     Ratio(
-        "pgv_over_pga_s",
-        "PGV/(PGA·g)",
-        " s",
-        ("pgv_m_s", "pga_g"),
+        "pgv_over_pga_s", "PGV/(PGA·g)", " s", ("pgv_m_s", "pga_g"),
         lambda v: v["pgv_m_s"] / (v["pga_g"] * STANDARD_GRAVITY_M_S2),
     ),
     Ratio(
-        "pgv_over_pga_tm",
-        "PGV/(PGA·g·Tm/2π)",
-        "",
-        ("pgv_m_s", "pga_g", "tm_s"),
+        "pgv_over_pga_tm", "PGV/(PGA·g·Tm/2π)", "", ("pgv_m_s", "pga_g", "tm_s"),
         lambda v: v["pgv_m_s"] * (2.0 * math.pi / STANDARD_GRAVITY_M_S2) / (v["pga_g"] * v["tm_s"]),
     ),
     Ratio(
-        "z",
-        "z = p·PGV/(PGA·g)",
-        "",
-        ("p", "pgv_m_s", "pga_g"),
+        "z", "z = p·PGV/(PGA·g)", "", ("p", "pgv_m_s", "pga_g"),
         lambda v: v["p"] * v["pgv_m_s"] / (v["pga_g"] * STANDARD_GRAVITY_M_S2),
     ),
     Ratio(
-        "pgd_pga_over_pgv2",
-        "PGD·PGA·g/PGV²",
-        "",
-        ("pgd_m", "pgv_m_s", "pga_g"),
+        "pgd_pga_over_pgv2", "PGD·PGA·g/PGV²", "", ("pgd_m", "pgv_m_s", "pga_g"),
         lambda v: v["pgd_m"] / v["pgv_m_s"] * (v["pga_g"] * STANDARD_GRAVITY_M_S2 / v["pgv_m_s"]),
     ),
     Ratio(
-        "pgd_over_pgv_tm",
-        "2π·PGD/(PGV·Tm)",
-        "",
-        ("pgd_m", "pgv_m_s", "tm_s"),
+        "pgd_over_pgv_tm", "2π·PGD/(PGV·Tm)", "", ("pgd_m", "pgv_m_s", "tm_s"),
         lambda v: v["pgd_m"] * 2.0 * math.pi / (v["pgv_m_s"] * v["tm_s"]),
         (1.18, 110.0),
     ),
-    *_sa_ratios(),
-)
+    *(ratio for period_s, name in SPECTRAL.items() for ratio in _sa_ratios(name, period_s)),
+)  # fmt: skip
 """The ratios that are fitted and judged; PGD·PGA/PGV² after Newmark and Rosenblueth (1971).
 
 Of a harmonic motion 2π·PGD/(PGV·Tm) is 1, and of any other more, because displacements have longer
@@ -210,7 +183,7 @@ class Spread(NamedTuple):
 
     def distance2(self, values: Mapping[str, Any], ns: ArrayNamespace) -> Any:
         """Return the squared Mahalanobis distance from the centre of the fitted points."""
-        log, packed = ns.log, self.packed
+        log, factors = ns.log, self.packed
         before: list[Any] = []
         total, k = 0.0, 0
         for name, middle in zip(self.names, self.centre):  # noqa: B905  (strict takes longer)
@@ -218,7 +191,7 @@ class Spread(NamedTuple):
             before.append(deviation)
             inner = 0.0
             for previous in before:
-                inner = inner + packed[k] * previous
+                inner = inner + factors[k] * previous
                 k += 1
             total = total + inner * deviation
         return total
@@ -247,20 +220,13 @@ def stored_spread(name: str, diagnostics: Mapping[str, Any]) -> Spread | None:
         return None
     try:
         names, centre = tuple(stored["names"]), tuple(float(v) for v in stored["centre"])
-        packed = _packed(stored["inverse_covariance"], len(names))
+        inverse = stored["inverse_covariance"]
         radius = float(stored["radius"])
-        if len(centre) != len(names):
+        if any(len(part) != len(names) for part in (centre, inverse, *inverse)):
             raise ValueError
+        factors = packed(inverse)
     except (KeyError, TypeError, ValueError, IndexError):
         raise ModelError(
             f"model {name!r} has no complete dispersion of its data: fit it again"
         ) from None
-    return Spread(names, centre, packed, radius * radius)
-
-
-def _packed(matrix: Sequence[Sequence[float]], size: int) -> tuple[float, ...]:
-    if len(matrix) != size or any(len(line) != size for line in matrix):
-        raise ValueError
-    return tuple(
-        float(matrix[i][j]) * (1.0 if i == j else 2.0) for i in range(size) for j in range(i + 1)
-    )
+    return Spread(names, centre, factors, radius * radius)

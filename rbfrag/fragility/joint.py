@@ -2,8 +2,9 @@
 any.
 
 The law is the normal copula of :mod:`rbfrag.fragility.dependence`. Means and variances of counts
-are exact; the beta-binomial law of both stands for that of the count. Samples are drawn in
-:mod:`rbfrag.fragility.joint_sampling`.
+are exact; the beta-binomial law of both stands for that of the count. Under uncertain shaking the
+fraction that fails is a mixture over what the sites share (:func:`shaken_share_range`). Samples are
+drawn in :mod:`rbfrag.fragility.joint_sampling`.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ from scipy.special import betaln, ndtr, ndtri
 from rbfrag.errors import InputError
 from rbfrag.fragility.dependence import Dependence
 from rbfrag.fragility.method import BlockParameters
+from rbfrag.fragility.shaking import POINTS, WEIGHTS
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.solver.results import FloatArray
 
@@ -127,10 +129,6 @@ class Placement:
         """Return a subset of the blocks."""
         return Placement(*(part[chosen] for part in vars(self).values()))
 
-    def correlation(self, dependence: Dependence) -> FloatArray:
-        """Return the correlation matrix R of the blocks, shape (n, n); azimuths must be known."""
-        return dependence.correlation(*vars(self).values())
-
 
 def any_fails(probability: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return P that any block fails, fully dependent and independent, tables x nodes each.
@@ -143,7 +141,7 @@ def any_fails(probability: FloatArray) -> tuple[FloatArray, FloatArray]:
     return probability.max(axis=-2), -np.expm1(none)
 
 
-def joint_excess(a: ArrayLike, b: ArrayLike, r: ArrayLike) -> FloatArray:
+def joint_excess(bound: ArrayLike, other: ArrayLike, r: ArrayLike) -> FloatArray:
     """Return Φ₂(a, b; R) - Φ(a) Φ(b), the covariance of two failures.
 
         1/2π ∫₀^{asin R} exp(-(a² + b² - 2ab sin t)/(2 cos² t)) dt
@@ -152,27 +150,25 @@ def joint_excess(a: ArrayLike, b: ArrayLike, r: ArrayLike) -> FloatArray:
     min(Φ(a), Φ(b)), so that the error stays below 1e-9 for every R.
 
     Args:
-        a: first bound, any shape; infinite where P is 0 or 1.
-        b: second bound.
+        bound: a, any shape; infinite where P is 0 or 1.
+        other: b.
         r: correlation, -1 to 1.
     """
-    first, second, r = np.broadcast_arrays(*(np.asarray(x, dtype=np.float64) for x in (a, b, r)))
+    columns = (np.asarray(x, dtype=np.float64) for x in (bound, other, r))
+    first, second, r = np.broadcast_arrays(*columns)
     first = np.clip(first, -_FARTHEST, _FARTHEST)
     second = np.clip(second, -_FARTHEST, _FARTHEST)
     near = np.abs(r) > _NEAR_ONE
-    excess = np.empty(r.shape)
-    excess[~near] = _integral(first[~near], second[~near], np.arcsin(r[~near]))
-    if near.any():
-        excess[near] = _excess_near_one(first[near], second[near], r[near])
-    return excess
-
-
-def _integral(a: FloatArray, b: FloatArray, angle: FloatArray) -> FloatArray:
-    total, squares, product = np.zeros(a.shape), 0.5 * (a * a + b * b), a * b
+    a, b, angle = first[~near], second[~near], np.arcsin(r[~near])
+    total, squares, product = np.zeros(angle.shape), 0.5 * (a * a + b * b), a * b
     for node, weight in zip(_NODES, _WEIGHTS, strict=True):
         sine = np.sin(angle * (0.5 + 0.5 * node))
         total += weight * np.exp((product * sine - squares) / (1.0 - sine * sine))
-    return np.asarray(total * angle / (4.0 * np.pi))
+    excess = np.empty(r.shape)
+    excess[~near] = total * angle / (4.0 * np.pi)
+    if near.any():
+        excess[near] = _excess_near_one(first[near], second[near], r[near])
+    return excess
 
 
 def _excess_near_one(a: FloatArray, b: FloatArray, r: FloatArray) -> FloatArray:
@@ -276,19 +272,16 @@ def count_moments(
     variance = float((w * w * p * (1.0 - p)).sum())
     for number in np.unique(blocks.earthquake):
         rows = np.flatnonzero(blocks.earthquake == number)
-        variance += 2.0 * _shared_variance(p[rows], w[rows], blocks.only(rows), dependence)
+        shaken, n, shared = blocks.only(rows), rows.size, 0.0
+        a, weight = ndtri(p[rows]), w[rows]
+        at_once = max(1, _PAIRS_AT_ONCE // n)
+        for start in range(0, n, at_once):  # pairs i < j
+            i, j = np.nonzero(np.arange(start, min(start + at_once, n))[:, None] < np.arange(n))
+            i += start
+            excess = pair_excess(a[i], a[j], shaken, i, j, dependence)
+            shared += float(excess @ (weight[i] * weight[j]))
+        variance += 2.0 * shared
     return float(p @ w), variance
-
-
-def _shared_variance(p: FloatArray, w: FloatArray, blocks: Placement, law: Dependence) -> float:
-    """Return the sum of covariances over all pairs of blocks in one earthquake."""
-    a, n, total = ndtri(p), blocks.size, 0.0
-    rows = max(1, _PAIRS_AT_ONCE // max(n, 1))
-    for start in range(0, n, rows):
-        i, j = np.nonzero(np.arange(start, min(start + rows, n))[:, None] < np.arange(n))
-        i += start
-        total += float(pair_excess(a[i], a[j], blocks, i, j, law) @ (w[i] * w[j]))
-    return total
 
 
 def pair_excess(
@@ -383,3 +376,50 @@ def count_quantiles(n: int, mean: float, variance: float, q: ArrayLike) -> IntAr
         trials = int(np.clip(np.ceil(mean / p if p > 0.0 else n), np.ceil(mean), n))
         counts = binom.ppf(levels, trials, mean / trials)
     return np.asarray(np.rint(counts), dtype=np.int64)
+
+
+_LEVELS: FloatArray = (np.arange(200.0) + 0.5) / 200.0
+_LEAST, _MOST = 1e-9, 1.0 - 1e-9
+
+
+def shaken_share_range(
+    along: FloatArray, tau: float, sigma: float, law: Dependence, sites: int, level: float
+) -> tuple[float, float]:
+    """Return the prediction interval of the failed fraction of identical blocks at several sites in
+    one earthquake.
+
+    Given what the shaking of all sites shares, that of each site is independent, and the number of
+    failures is beta-binomial, as in :func:`rbfrag.fragility.joint.share_range`, of the mean and of
+    the variance of pairs over what each site has of its own; blocks of one site share all of it.
+    The law is the mixture over what is shared. For many sites it is that of the mean over a site's
+    own shaking of Φ((a + √ρ_e u)/√(1 - ρ_e)), u and the shared part being standard normal.
+
+    Args:
+        along: P at each of the points of the first measure, shape (41,).
+        tau: standard deviation of what all sites share of its logarithm.
+        sigma: that of the whole.
+        law: what the blocks of one earthquake share beyond the shaking.
+        sites: their number.
+        level: probability that the share lies between both ends.
+    """
+    x, w = np.array(POINTS), np.array(WEIGHTS)
+    ratio = min(tau / sigma, 1.0)
+    # rows are what is shared, columns what is a site's own
+    score = ratio * x[:, None] + np.sqrt(1.0 - ratio * ratio) * x
+    p = np.clip(np.interp(score, x, along), _LEAST * _LEAST, _MOST)
+    mean, a = p @ w, ndtri(p)
+    root = np.sqrt(1.0 - law.rho_e)
+    common = ndtr((a[:, None] + np.sqrt(law.rho_e) * x[:, None]) / root) @ w
+    n, site = SIDES * sites, law.rho_e + law.rho_s
+    pairs = (n - SIDES) / (n - 1.0) * (np.square(common) @ w)
+    for number, r in ((1.0, site + law.rho_v - law.rho_o), (2.0, site)):
+        pairs += number / (n - 1.0) * ((joint_excess(a, a, np.full(a.shape, r)) + p * p) @ w)
+    alone = np.maximum(mean * (1.0 - mean), _LEAST * _LEAST)
+    rho = np.asarray(np.clip((pairs - mean * mean) / alone, _LEAST, _MOST), dtype=np.float64)
+    counts = beta_binomial_quantiles(n, mean, rho, _LEVELS)
+    order = np.argsort(counts, axis=None)
+    below = np.cumsum(np.broadcast_to(w / _LEVELS.size, counts.shape).ravel()[order])
+    tail = 0.5 - 0.5 * level
+    indices = np.minimum(np.searchsorted(below, (tail, 1.0 - tail)), order.size - 1)
+    low, high = counts.ravel()[order[indices]] / n
+    return float(low), float(high)

@@ -4,19 +4,39 @@
 The parts of Z are drawn one by one: what an earthquake and a site share are Ornstein-Uhlenbeck
 processes in l = ln p, what a component shares is a product of two, in l and ln y. Cost and memory
 grow with n alone.
+
+A sample of :class:`JointSampler` scatters by the root of its size. The normals of
+:class:`LatentPoints` stand on scrambled Sobol points (Owen 1998), the principal components of what
+blocks share first, and cover their space evenly: means converge faster, and repeated scrambles give
+the error of a mean.
+
+:class:`LargeCounts` draws the number of failures among very many blocks, without simulating each.
+Given what an earthquake shares, E(l), failures of different sites are independent: their number has
+the mean Σ Φ((a - √ρ E)/√(1-ρ)) and a variance to which pairs of one site add. Drawn is E, and then
+a number of this mean and variance: negative binomial, or binomial where pairs add nothing.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Sequence
+from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.special import ndtri
+from scipy.special import ndtr, ndtri
 
 from rbfrag.fragility.dependence import Dependence
-from rbfrag.fragility.joint import COMPONENTS, SIDES, Indices, Placement, checked
+from rbfrag.fragility.joint import (
+    COMPONENTS,
+    SIDES,
+    Indices,
+    IntArray,
+    Placement,
+    checked,
+    joint_excess,
+    pair_correlations,
+)
 from rbfrag.solver.results import FloatArray
 
 JITTER = 1e-8
@@ -92,12 +112,6 @@ class JointSampler:
         return np.asarray(self.normals(draws, generator) <= ndtri(p))
 
 
-def _cholesky(r: FloatArray) -> FloatArray:
-    n = r.shape[-1]
-    r[..., np.arange(n), np.arange(n)] += JITTER
-    return np.asarray(np.linalg.cholesky(r / (1.0 + JITTER)))
-
-
 def _unlike(*columns: NDArray[np.generic]) -> tuple[Indices, Indices]:
     """Return the indices of distinct rows, sorted by the columns, and the inverse index of each
     row.
@@ -121,37 +135,28 @@ class _Line:
         starts[:1] = True
         for labels in group:
             starts[1:] |= labels[first][1:] != labels[first][:-1]
-        self._ranks = _by_rank(starts)
-        self._steps = _Transitions.of(np.diff(x[first], prepend=0.0), length)
+        # the first rows of all groups, then the second rows, and so on
+        row = np.arange(starts.size)
+        rank = row - np.maximum.accumulate(np.where(starts, row, 0))
+        order = np.argsort(rank, kind="stable")
+        self._ranks = np.split(order, np.flatnonzero(np.diff(rank[order])) + 1)
+        self._correlation, self._new = _transitions(np.diff(x[first], prepend=0.0), length)
 
     def draw(self, draws: int, generator: np.random.Generator) -> FloatArray:
         """Return the values at x, shape (draws, n)."""
-        value = generator.standard_normal((self._steps.correlation.size, draws))
+        value = generator.standard_normal((self._correlation.size, draws))
         for at in self._ranks[1:]:
-            value[at] *= self._steps.new[at, None]
-            value[at] += self._steps.correlation[at, None] * value[at - 1]
+            value[at] *= self._new[at, None]
+            value[at] += self._correlation[at, None] * value[at - 1]
         return np.asarray(value.T[:, self._node])
 
 
-@dataclass(frozen=True, eq=False)
-class _Transitions:
-    """Transitions between nodes of an Ornstein-Uhlenbeck process: correlation and innovation."""
-
-    correlation: FloatArray
-    new: FloatArray
-
-    @classmethod
-    def of(cls, step: FloatArray, length: float) -> _Transitions:
-        away = np.abs(step) / length
-        return cls(np.exp(-away), np.sqrt(-np.expm1(-2.0 * away)))
-
-
-def _by_rank(starts: NDArray[np.bool_]) -> list[Indices]:
-    """Return the first rows of all groups, then the second rows, and so on."""
-    row = np.arange(starts.size)
-    rank = row - np.maximum.accumulate(np.where(starts, row, 0))
-    order = np.argsort(rank, kind="stable")
-    return np.split(order, np.flatnonzero(np.diff(rank[order])) + 1)
+def _transitions(step: FloatArray, length: float) -> tuple[FloatArray, FloatArray]:
+    """Return the correlation of each node of an Ornstein-Uhlenbeck process with the one before, and
+    the standard deviation of what is new.
+    """
+    away = np.abs(step) / length
+    return np.exp(-away), np.sqrt(-np.expm1(-2.0 * away))
 
 
 class _Surface:
@@ -181,15 +186,19 @@ class _Surface:
         x, y = x[first], y[first]
         self._factors: list[tuple[Indices, FloatArray]] = []
         for size in np.unique(number[number <= MOST_OF_A_COMPONENT]):
-            for rows in _portions(start[number == size][:, None] + np.arange(size)):
+            groups = start[number == size][:, None] + np.arange(size)
+            at_once = max(1, _VALUES_AT_ONCE // size**2)  # matrices stay within memory
+            for portion in range(0, groups.shape[0], at_once):
+                rows = groups[portion : portion + at_once]
                 apart = [np.abs(v[rows][:, :, None] - v[rows][:, None, :]) for v in (x, y)]
                 r = np.exp(-apart[0] / lengths[0] - apart[1] / lengths[1])
-                self._factors.append((rows, _cholesky(r)))
+                r[..., np.arange(size), np.arange(size)] += JITTER
+                self._factors.append((rows, np.linalg.cholesky(r / (1.0 + JITTER))))
         self._grids: list[tuple[Indices, _Axis, _Axis]] = []
         for begin, size in zip(start, number, strict=True):
             if size > MOST_OF_A_COMPONENT:
                 rows = np.arange(begin, begin + size)
-                axes = _Axis.at(x[rows], lengths[0]), _Axis.at(y[rows], lengths[1])
+                axes = _Axis(x[rows], lengths[0]), _Axis(y[rows], lengths[1])
                 self._grids.append((rows, *axes))
 
     def draw(self, draws: int, generator: np.random.Generator) -> FloatArray:
@@ -209,32 +218,366 @@ class _Surface:
         return value[:, self._node]
 
 
-def _portions(rows: Indices) -> Iterator[Indices]:
-    """Yield groups in batches whose matrices stay within memory."""
-    at_once = max(1, _VALUES_AT_ONCE // rows.shape[1] ** 2)
-    for start in range(0, rows.shape[0], at_once):
-        yield rows[start : start + at_once]
-
-
-@dataclass(frozen=True, eq=False)
-class _Axis(_Transitions):
+class _Axis:
     """Nodes of one variable of a grid, and the node of each point."""
 
-    node: Indices
-
-    @classmethod
-    def at(cls, x: FloatArray, length: float) -> _Axis:
-        nodes, node = np.unique(x, return_inverse=True)
+    def __init__(self, x: FloatArray, length: float) -> None:
+        nodes, self.node = np.unique(x, return_inverse=True)
         span = float(nodes[-1] - nodes[0])
         enough = int(np.ceil(span / (length * NODE_STEP))) + 1
         if nodes.size > enough:
             nodes = np.linspace(nodes[0], nodes[-1], enough)
-            node = np.rint((x - nodes[0]) / max(span, 1e-300) * (enough - 1)).astype(np.intp)
-        steps = _Transitions.of(np.diff(nodes, prepend=0.0), length)
-        return cls(steps.correlation, steps.new, node)
+            self.node = np.rint((x - nodes[0]) / max(span, 1e-300) * (enough - 1)).astype(np.intp)
+        self.correlation, self._new = _transitions(np.diff(nodes, prepend=0.0), length)
 
     def run(self, noise: FloatArray) -> None:
         """Transform independent normals, first axis along the nodes, into the process."""
         for k in range(1, self.correlation.size):
-            noise[k] *= self.new[k]
+            noise[k] *= self._new[k]
             noise[k] += self.correlation[k] * noise[k - 1]
+
+
+REPLICATES = 2
+"""Independent scrambles of the points; what means over them differ by is their error."""
+
+MOST_RANK = 256
+"""Principal components that are kept of one part of Z; more blocks are unlike in these alone."""
+
+MOST_EVEN = 256
+"""Coordinates of a point that are of low discrepancy; those beyond it matter least."""
+
+_LEAST = 2.0**-33
+_LEAST_SHARE = 1e-13
+
+
+@lru_cache(maxsize=4)
+def _even_normals(power: int, seed: int) -> FloatArray:
+    """Return low-discrepancy normals, `MOST_EVEN` x points of all scrambles: one set for all."""
+    from scipy.stats.qmc import Sobol
+
+    drawn = [
+        Sobol(MOST_EVEN, rng=generator).random_base2(power)
+        for generator in np.random.default_rng(seed).spawn(REPLICATES)
+    ]
+    uniform = np.ascontiguousarray(np.concatenate(drawn).T)
+    return np.asarray(ndtri(np.clip(uniform, _LEAST, 1.0 - _LEAST)))
+
+
+@lru_cache(maxsize=4)
+def _first_sides(power: int, seed: int, rows: int) -> NDArray[np.int8]:
+    """Return the first side that each block faces, rows x points."""
+    generator = np.random.default_rng([seed, rows])
+    return generator.integers(SIDES, size=(rows, REPLICATES << power), dtype=np.int8)
+
+
+_Part = tuple[int, Indices, Indices, FloatArray]
+"""One Gaussian field of a group of blocks, the contribution of an earthquake, site or component to
+Z: the row of the values that it adds to (common, symmetric, antisymmetric), its blocks, whether it
+is of the first or the second component that each may face, and the matrix from independent normals
+to its values, shape (members, rank)."""
+
+
+class LatentPoints:
+    """Z of blocks at low-discrepancy points, reproducible.
+
+    A block of unknown azimuth has a Z for each of the four sides that it may face, all equally
+    likely; one of known azimuth has the same in all four.
+
+    Args:
+        points: number of points of all replicates, of which a power of two in each is taken.
+        seed: seed of the scrambles.
+    """
+
+    def __init__(
+        self, dependence: Dependence, blocks: Placement, points: int, seed: int = 0
+    ) -> None:
+        self._blocks = blocks
+        self._seed = seed
+        self._power = max(0, int(np.log2(max(1, points // REPLICATES))))
+        self._parts = list(_parts(dependence, blocks))
+        variance = [np.square(loading).sum(axis=0) for *_, loading in self._parts]
+        order = np.argsort(-np.concatenate([*variance, np.zeros(0)]), kind="stable")
+        self._coordinate = np.argsort(order, kind="stable")
+
+    @property
+    def points(self) -> int:
+        """Number of points of all replicates."""
+        return REPLICATES << self._power
+
+    def sides(self) -> tuple[FloatArray, NDArray[np.int8]]:
+        """Return Z on each side that blocks may face, and the first side of each.
+
+        Sides are four where an azimuth is not known, else one; turned by one after another, each
+        block faces each of its sides once.
+
+        Returns:
+            Sides x n x points of one replicate after another, and n x points.
+        """
+        blocks, start = self._blocks, 0
+        n, drawn = blocks.size, blocks.drawn
+        slots, ways = (COMPONENTS, SIDES) if drawn.any() else (1, 1)
+        # of low discrepancy for the most important coordinates
+        normal, more = _even_normals(self._power, self._seed), self._coordinate.size - MOST_EVEN
+        if more > 0:
+            generator = np.random.default_rng([self._seed, more])
+            normal = np.concatenate([normal, generator.standard_normal((more, self.points))])
+        field = np.zeros((3, slots, n, self.points))
+        for kind, member, slot, loading in self._parts:
+            stop = start + loading.shape[1]
+            field[kind, slot, member] += loading @ normal[self._coordinate[start:stop]]
+            start = stop
+        common, symmetric, antisymmetric = field
+        symmetric += common[0]
+        z = np.stack([symmetric[k // 2] + q * antisymmetric[k // 2] for k, q in _SIDES[:ways]])
+        has_azimuth = ~drawn
+        z[:, has_azimuth] = (symmetric[0] + blocks.polarity[:, None] * antisymmetric[0])[
+            has_azimuth
+        ]
+        rows = max(n, MOST_EVEN)  # one set for all but large sites
+        return z, _first_sides(self._power, self._seed, rows)[:n]
+
+
+_SIDES = tuple(enumerate((1, -1) * COMPONENTS))
+"""Sides: both polarities of one component, then of the other."""
+
+
+def _parts(law: Dependence, blocks: Placement) -> Iterator[_Part]:
+    """Yield the fields whose sum is Z."""
+    everyone = np.arange(blocks.size)
+    for earthquake in np.unique(blocks.earthquake):
+        shaken = everyone[blocks.earthquake == earthquake]
+        sites = np.unique(blocks.site[shaken])
+        single = sites.size == 1  # what the earthquake and what the site shares then is one field
+        share = law.rho_e + (law.rho_s if single else 0.0)
+        yield from _part(blocks, 0, shaken, [np.zeros_like(shaken)], share, law.l_e)
+        for site in sites:
+            members = shaken[blocks.site[shaken] == site]
+            if not single:
+                yield from _part(blocks, 0, members, [np.zeros_like(members)], law.rho_s, law.l_e)
+            yield from _of_components(law, blocks, members)
+
+
+def _of_components(law: Dependence, blocks: Placement, members: Indices) -> Iterator[_Part]:
+    """Yield the contributions of the components of a site; blocks of unknown azimuth belong to
+    both.
+    """
+    drawn, components = blocks.drawn[members], blocks.component[members]
+    slots: dict[bytes, tuple[Indices, list[Indices]]] = {}
+    for number, name in enumerate(range(COMPONENTS) if drawn.any() else np.unique(components)):
+        rows = members[drawn | (components == name)]
+        slot = np.where(blocks.drawn[rows], number, 0)
+        slots.setdefault(rows.tobytes(), (rows, []))[1].append(slot)
+    for rows, several in slots.values():
+        for kind, share, length in ((1, law.rho_v, law.l_v), (2, law.rho_o, law.l_o)):
+            yield from _part(blocks, kind, rows, several, share, length, law.l_y)
+
+
+def _part(
+    blocks: Placement,
+    kind: int,
+    member: Indices,
+    slots: Sequence[Indices],
+    share: float,
+    length: float,
+    length_y: float = np.inf,
+) -> Iterator[_Part]:
+    """Yield independent fields of one covariance, one for each row of slots."""
+    if share > 0.0 and member.size:
+        x, y = blocks.l[member] / length, blocks.ln_y[member] / length_y
+        loading = np.sqrt(share) * _loading(x, y)
+        yield from ((kind, member, slot, loading) for slot in slots)
+
+
+def _loading(x: FloatArray, y: FloatArray) -> FloatArray:
+    """Return principal components of exp(-|Δx| - |Δy|), shape (n, rank), rows of norm 1."""
+
+    def kernel(rows: Indices | slice) -> FloatArray:
+        away = np.abs(x[:, None] - x[None, rows]) + np.abs(y[:, None] - y[None, rows])
+        return np.asarray(np.exp(-away))
+
+    if x.size <= MOST_RANK:
+        value, vector = np.linalg.eigh(kernel(slice(None)))
+        loading = vector * np.sqrt(np.maximum(value, 0.0))
+    else:
+        root = _pivoted_root(kernel, x.size)
+        value, vector = np.linalg.eigh(root.T @ root)
+        loading = root @ vector
+    loading = loading[:, ::-1][:, value[::-1] > _LEAST_SHARE * x.size]
+    return np.asarray(loading / np.linalg.norm(loading, axis=1, keepdims=True))
+
+
+def _pivoted_root(kernel: Callable[[Indices], FloatArray], size: int) -> FloatArray:
+    """Return `MOST_RANK` columns of the pivoted Cholesky factor.
+
+    The pivoted factorization of Harbrecht, Peters and Schneider (2012).
+    """
+    root, variance = np.zeros((size, MOST_RANK)), np.ones(size)
+    for k in range(MOST_RANK):
+        pivot = int(variance.argmax())
+        column = kernel(np.array([pivot]))[:, 0] - root[:, :k] @ root[pivot, :k]
+        root[:, k] = column / np.sqrt(variance[pivot])
+        variance = np.maximum(variance - root[:, k] ** 2, 0.0)
+        variance[pivot] = 0.0
+    return root
+
+
+NODES = 25
+"""Nodes of E over ln p."""
+
+_CELL, _WIDEST = 0.2, 40
+"""Width of Φ⁻¹(P) of blocks that are taken together, and how many of it there are to both sides."""
+
+_PAIRS, _LEVELS = 256, np.array([-1.7, 0.0, 1.7])
+"""Pairs of one site that stand for all, and the values of E at which they are taken."""
+
+_FLOOR, _LITTLE = 1e-12, 1e-7
+
+
+class LatentEvent(NamedTuple):
+    """Latent variables shared by all blocks of an earthquake.
+
+    Args:
+        value: E at the nodes, draws x nodes.
+        seed: of what else is random.
+    """
+
+    value: FloatArray
+    seed: int
+
+
+class LargeCounts:
+    """Random generator of the number of failures among many blocks in one earthquake.
+
+    Args:
+        blocks: rows of like blocks of unknown azimuths, those of one site together.
+        count: blocks of each row, shape (m,).
+    """
+
+    def __init__(self, law: Dependence, blocks: Placement, count: IntArray) -> None:
+        self._law, self._blocks, self._count = law, blocks, count
+        nodes = np.linspace(blocks.l.min(), blocks.l.max(), NODES)
+        step = max(float(nodes[1] - nodes[0]), 1e-9)
+        self._node = np.rint((blocks.l - nodes[0]) / step).astype(np.intp)
+        away = np.abs(nodes[:, None] - nodes) / law.l_e
+        self._factor = np.linalg.cholesky(np.exp(-away) + 1e-9 * np.eye(NODES))
+        self._last = np.cumsum(count)
+        starts = np.flatnonzero(np.diff(blocks.site, prepend=blocks.site[0] - 1))
+        number = np.diff(np.append(starts, count.size))
+        self._from = np.repeat(self._last[starts] - count[starts], number)
+        self._of_site = np.repeat(np.add.reduceat(count, starts), number)
+
+    def latent(self, draws: int, generator: np.random.Generator) -> LatentEvent:
+        """Return the shared latent variables of the samples of one earthquake."""
+        value = generator.standard_normal((draws, NODES)) @ self._factor.T
+        return LatentEvent(value, int(generator.integers(1 << 62)))
+
+    def sums(
+        self,
+        bound: FloatArray,
+        common: float,
+        latent: LatentEvent,
+        marks: Sequence[tuple[FloatArray, FloatArray]],
+    ) -> tuple[FloatArray, float]:
+        """Return sums of marks over the failed blocks of each sample, and P that any fails.
+
+        Args:
+            bound: Φ⁻¹ of P of a block of each row, shape (m,).
+            common: fraction of the variance that the blocks of a site share in addition to Z, as
+                by dispersion of the shaking.
+            marks: mean and mean square of what a failure of each row adds, shape (m,) each.
+
+        Returns:
+            Marks x draws; the probability.
+        """
+        p, rho = ndtr(bound), self._law.rho_e * (1.0 - common)
+        number = self._count * p
+        cells = np.clip(np.rint(bound / _CELL), -_WIDEST, _WIDEST).astype(np.intp) + _WIDEST
+        cells = cells * NODES + self._node
+
+        def summed(values: FloatArray | IntArray) -> FloatArray:
+            total = np.bincount(cells, values, minlength=NODES * (2 * _WIDEST + 1))
+            return total.astype(np.float64)
+
+        mean = summed(number)
+        used = np.flatnonzero(mean > _LITTLE * mean.sum())
+        many, mean, node = summed(self._count)[used], mean[used], used % NODES
+        a = ndtri(mean / many)
+
+        def conditional_p(value: FloatArray) -> FloatArray:
+            return np.asarray(ndtr((a - np.sqrt(rho) * value) / np.sqrt(1.0 - rho)))
+
+        at_levels = conditional_p(_LEVELS[:, None])
+        alone = (at_levels * (1.0 - at_levels)) @ many
+        more = self._of_pairs(bound, number, common, rho) / np.maximum(alone, _FLOOR)
+        q = conditional_p(latent.value[:, node])
+        mean_of = q @ many
+        order = np.argsort(at_levels @ many)
+        shared = np.interp(mean_of, (at_levels @ many)[order], more[order])
+        variance = (q * (1.0 - q)) @ many * (1.0 + np.maximum(shared, 0.0))
+        generator = np.random.default_rng(latent.seed)
+        failures, none = _number(mean_of, variance, generator)
+        result = np.empty((len(marks), failures.size))
+        for row, (mark, square) in zip(result, marks, strict=True):
+            mean_mark, squares = (
+                q @ (many * summed(number * moment)[used] / mean) / mean_of
+                for moment in (mark, square)
+            )
+            row[:] = failures * mean_mark
+            scatter = np.maximum(squares - mean_mark * mean_mark, 0.0)
+            is_random = (failures > 0) & (scatter > _FLOOR * mean_mark * mean_mark)
+            shape = failures[is_random] * mean_mark[is_random] ** 2 / scatter[is_random]
+            row[is_random] *= generator.standard_gamma(shape) / shape
+        return result, float(1.0 - none.mean())
+
+    def _of_pairs(
+        self, bound: FloatArray, number: FloatArray, common: float, rho: float
+    ) -> FloatArray:
+        """Return the variance from pairs at one site at the levels of E, shape (levels,).
+
+        Each of some blocks, the more likely the more it fails, stands for all, with one other of
+        its site for all others.
+        """
+        law, blocks, generator = self._law, self._blocks, np.random.default_rng(0)
+        below = np.cumsum(number)
+        i = np.searchsorted(below, below[-1] * (np.arange(_PAIRS) + 0.5) / _PAIRS)
+        other_blocks = self._of_site[i] - 1
+        position = self._last[i] - 1 - self._from[i]
+        other = np.floor((generator.permutation(_PAIRS) + 0.5) / _PAIRS * other_blocks).astype(
+            np.int64
+        )
+        other += other >= position
+        j = np.searchsorted(
+            self._last, self._from[i] + np.minimum(other, other_blocks), side="right"
+        )
+        apart, _, (opposite, same) = pair_correlations(blocks, i, j, law)
+        event = law.rho_e * np.exp(-np.abs(blocks.l[i] - blocks.l[j]) / law.l_e)
+        total = np.zeros(_LEVELS.size)
+        for weight, r in ((0.5, apart), (0.25, opposite), (0.25, same)):
+            within = ((1.0 - common) * (r - event) + common) / (1.0 - rho)
+            a, b = (
+                (bound[k] - np.sqrt(rho) * _LEVELS[:, None]) / np.sqrt(1.0 - rho) for k in (i, j)
+            )
+            excess = joint_excess(a, b, np.clip(within, -1.0, 1.0))
+            total += weight * (excess * other_blocks / ndtr(bound[i])).sum(axis=1)
+        return np.asarray(total * below[-1] / _PAIRS)
+
+
+def _number(
+    mean: FloatArray, variance: FloatArray, generator: np.random.Generator
+) -> tuple[IntArray, FloatArray]:
+    """Return random counts with these means and variances, and the probability of zero."""
+    wide = variance > mean * (1.0 + 1e-9)
+    mean = np.maximum(mean, _FLOOR)
+    size = np.where(wide, mean * mean / np.where(wide, variance - mean, 1.0), 1.0)
+    p = np.clip(np.where(wide, mean / np.maximum(variance, _FLOOR), 0.5), _FLOOR, 1.0 - 1e-15)
+    trials = np.ceil(mean / np.maximum(1.0 - np.minimum(variance / mean, 1.0), _FLOOR))
+    trials = np.minimum(trials, 1e15)
+    chance = np.minimum(mean / trials, 1.0)
+    number = np.where(
+        wide,
+        generator.negative_binomial(size, p),
+        generator.binomial(trials.astype(np.int64), chance),
+    )
+    with np.errstate(divide="ignore"):
+        none = np.where(wide, size * np.log(p), trials * np.log1p(-chance))
+    return number, np.exp(none)

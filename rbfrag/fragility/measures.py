@@ -8,7 +8,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass
-from functools import partial
 from typing import Any, TypeVar
 
 from rbfrag.errors import InputError
@@ -58,34 +57,14 @@ class Term:
         return self.formula(*[measures[name] for name in (*self.inputs, *self.of_block)])
 
 
-def pgv_m_s(pgv_m_s: Any) -> Any:
-    """Return the peak ground velocity [m/s] itself."""
-    return pgv_m_s
-
-
-def pga_tm_m_s(pga_g: Any, tm_s: Any) -> Any:
-    """Return PGA·g·Tm/2π [m/s] from PGA [g] and the mean period [s] (equation 4.31)."""
-    return pga_g * STANDARD_GRAVITY_M_S2 * tm_s / (2.0 * math.pi)
-
-
-def first_m_s(*measures: Any) -> Any:
-    """Return the first intensity measure [m/s]; the others are separate predictors."""
-    return measures[0]
-
-
-def pga_over_p_m_s(pga_g: Any, p: Any) -> Any:
-    """Return PGA·g/p [m/s] from PGA [g] and the frequency parameter p of the block [1/s]."""
-    return pga_g * STANDARD_GRAVITY_M_S2 / p
-
-
-def _first_over_p(pga_g: Any, *rest: Any) -> Any:
-    """Return PGA·g/p [m/s], with p last; the other intensity measures are separate predictors."""
-    return pga_over_p_m_s(pga_g, rest[-1])
-
-
 def spectral_velocity_m_s(sa_g: Any, period_s: float) -> Any:
     """Return V_T = SA·g·T/2π [m/s] from a spectral acceleration [g] and its period [s]."""
     return sa_g * (STANDARD_GRAVITY_M_S2 * period_s / (2.0 * math.pi))
+
+
+def _first(*measures: Any) -> Any:
+    """Return the first intensity measure [m/s]; the others are separate predictors."""
+    return measures[0]
 
 
 def _first_at_1s(sa10_g: Any, *_rest: Any) -> Any:
@@ -93,120 +72,46 @@ def _first_at_1s(sa10_g: Any, *_rest: Any) -> Any:
     return spectral_velocity_m_s(sa10_g, 1.0)
 
 
-def pgd_tm_m_s(pgd_m: Any, tm_s: Any) -> Any:
-    """Return 2π·PGD/Tm [m/s] from PGD [m] and the mean period [s] (equation 4.31)."""
-    return pgd_m * (2.0 * math.pi) / tm_s
+def _first_over_p(pga_g: Any, *rest: Any) -> Any:
+    """Return PGA·g/p [m/s], with p last; the other intensity measures are separate predictors."""
+    return pga_g * STANDARD_GRAVITY_M_S2 / rest[-1]
 
+
+_PGV, _SA = "peak ground velocity", "spectral acceleration at 1 s, as a velocity"
+_PGA = "peak ground acceleration over the block's frequency parameter"
+_SA_SYMBOL = "SA(1.0)·g·T/2π"
 
 TERMS: Mapping[str, Term] = {
     term.name: term
     for term in (
-        Term(
-            "pgv_kr",
-            "peak ground velocity, with the block's strength",
-            "PGV",
-            ("pgv_m_s",),
-            pgv_m_s,
-        ),
-        Term("pgv", "peak ground velocity", "PGV", ("pgv_m_s",), pgv_m_s),
-        Term(
-            "pga_sa03_sa10_sa30",
-            "spectral acceleration at 1 s, as a velocity, with PGA and those at 0.3 and 3 s",
-            "SA(1.0)·g·T/2π",
-            ("sa10_g", "pga_g", "sa03_g", "sa30_g"),
-            _first_at_1s,
-        ),
-        Term(
-            "pga_tm",
-            "peak ground acceleration over mean frequency",
-            "PGA·g·Tm/2π",
-            ("pga_g", "tm_s"),
-            pga_tm_m_s,
-        ),
-        Term(
-            "pga_sa10",
-            "spectral acceleration at 1 s, as a velocity, with PGA",
-            "SA(1.0)·g·T/2π",
-            ("sa10_g", "pga_g"),
-            _first_at_1s,
-        ),
-        Term(
-            "sa10",
-            "spectral acceleration at 1 s, as a velocity",
-            "SA(1.0)·g·T/2π",
-            ("sa10_g",),
-            partial(spectral_velocity_m_s, period_s=1.0),
-        ),
-        Term(
-            "pga",
-            "peak ground acceleration over the block's frequency parameter",
-            "PGA·g/p",
-            ("pga_g",),
-            pga_over_p_m_s,
-            of_block=("p",),
-        ),
-        Term(
-            "pgd_tm",
-            "peak ground displacement times mean frequency",
-            "2π·PGD/Tm",
-            ("pgd_m", "tm_s"),
-            pgd_tm_m_s,
-            variance_degree=2,
-            by_name=True,
-        ),
-        Term(
-            "pgv_pga",
-            "peak ground velocity, with PGA",
-            "PGV",
-            ("pgv_m_s", "pga_g"),
-            first_m_s,
-        ),
-        Term(
-            "pgv_pga_tm",
-            "peak ground velocity, with PGA and Tm",
-            "PGV",
-            ("pgv_m_s", "pga_g", "tm_s"),
-            first_m_s,
-        ),
-        Term(
-            "pgv_pga_sa10_sa30",
-            "peak ground velocity, with PGA and spectral accelerations at 1 and 3 s",
-            "PGV",
-            ("pgv_m_s", "pga_g", "sa10_g", "sa30_g"),
-            first_m_s,
-        ),
-        Term(
-            "pga_sa10_sa30",
-            "spectral acceleration at 1 s, as a velocity, with PGA and that at 3 s",
-            "SA(1.0)·g·T/2π",
-            ("sa10_g", "pga_g", "sa30_g"),
-            _first_at_1s,
-        ),
-        Term(
-            "pga_m",
-            "peak ground acceleration over the block's frequency parameter, with magnitude",
-            "PGA·g/p",
-            ("pga_g", "magnitude"),
-            _first_over_p,
-            of_block=("p",),
-        ),
-        Term(
-            "pgv_pga_m",
-            "peak ground velocity, with PGA and magnitude",
-            "PGV",
-            ("pgv_m_s", "pga_g", "magnitude"),
-            first_m_s,
-        ),
-        Term(
-            "pgv_pga_ia",
-            "peak ground velocity, with PGA and Arias intensity",
-            "PGV",
-            ("pgv_m_s", "pga_g", "arias_m_s"),
-            first_m_s,
-        ),
-        Term("xp", "toppling spectrum", "X(p)", ("xp_m_s", "pga_g"), first_m_s),
+        Term("pgv_kr", f"{_PGV}, with the block's strength", "PGV", ("pgv_m_s",), _first),
+        Term("pgv", _PGV, "PGV", ("pgv_m_s",), _first),
+        Term("pga_sa03_sa10_sa30", f"{_SA}, with PGA and those at 0.3 and 3 s", _SA_SYMBOL,
+             ("sa10_g", "pga_g", "sa03_g", "sa30_g"), _first_at_1s),
+        Term("pga_tm", "peak ground acceleration over mean frequency", "PGA·g·Tm/2π",
+             ("pga_g", "tm_s"),  # equation (4.31)
+             lambda pga_g, tm_s: pga_g * STANDARD_GRAVITY_M_S2 * tm_s / (2.0 * math.pi)),
+        Term("pga_sa10", f"{_SA}, with PGA", _SA_SYMBOL, ("sa10_g", "pga_g"), _first_at_1s),
+        Term("sa10", _SA, _SA_SYMBOL, ("sa10_g",), _first_at_1s),
+        Term("pga", _PGA, "PGA·g/p", ("pga_g",), _first_over_p, of_block=("p",)),
+        Term("pgd_tm", "peak ground displacement times mean frequency", "2π·PGD/Tm",
+             ("pgd_m", "tm_s"),  # equation (4.31)
+             lambda pgd_m, tm_s: pgd_m * (2.0 * math.pi) / tm_s, variance_degree=2, by_name=True),
+        Term("pgv_pga", f"{_PGV}, with PGA", "PGV", ("pgv_m_s", "pga_g"), _first),
+        Term("pgv_pga_tm", f"{_PGV}, with PGA and Tm", "PGV", ("pgv_m_s", "pga_g", "tm_s"), _first),
+        Term("pgv_pga_sa10_sa30", f"{_PGV}, with PGA and spectral accelerations at 1 and 3 s",
+             "PGV", ("pgv_m_s", "pga_g", "sa10_g", "sa30_g"), _first),
+        Term("pga_sa10_sa30", f"{_SA}, with PGA and that at 3 s", _SA_SYMBOL,
+             ("sa10_g", "pga_g", "sa30_g"), _first_at_1s),
+        Term("pga_m", f"{_PGA}, with magnitude", "PGA·g/p", ("pga_g", "magnitude"), _first_over_p,
+             of_block=("p",)),
+        Term("pgv_pga_m", f"{_PGV}, with PGA and magnitude", "PGV",
+             ("pgv_m_s", "pga_g", "magnitude"), _first),
+        Term("pgv_pga_ia", f"{_PGV}, with PGA and Arias intensity", "PGV",
+             ("pgv_m_s", "pga_g", "arias_m_s"), _first),
+        Term("xp", "toppling spectrum", "X(p)", ("xp_m_s", "pga_g"), _first),
     )
-}
+}  # fmt: skip
 """The terms by name."""
 
 SCATTERED = {
@@ -215,6 +120,9 @@ SCATTERED = {
     if measure.uncertain
 }
 """By the name of its standard deviation each measure that may be known with scatter."""
+
+SIGMAS = {measure: sigma for sigma, measure in SCATTERED.items()}
+"""The name of the standard deviation of each such measure."""
 
 AMPLIFIED = {name: measure.power for name, measure in vocabulary.MEASURES.items() if measure.power}
 """Measures that grow with the amplitude of the shaking, and to which power."""
@@ -269,12 +177,9 @@ def terms_from(names: Collection[str]) -> tuple[str, ...]:
 
 def least_inputs(terms: Iterable[str]) -> list[tuple[str, ...]]:
     """Return the minimal sets of intensity measures that suffice for any of the terms."""
-    input_sets = [TERMS[name].inputs for name in terms if name in TERMS]
-    user_sets = [inputs for inputs in input_sets if set(inputs) <= set(INTENSITY)]
-    least = [
-        inputs for inputs in user_sets if not any(set(other) < set(inputs) for other in user_sets)
-    ]
-    return list(dict.fromkeys(least))
+    sets = [TERMS[name].inputs for name in terms if name in TERMS]
+    sets = [inputs for inputs in dict.fromkeys(sets) if set(inputs) <= set(INTENSITY)]
+    return [inputs for inputs in sets if not any(set(other) < set(inputs) for other in sets)]
 
 
 LOWEST, HIGHEST = 1e-9, 1e9

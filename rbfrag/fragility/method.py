@@ -23,6 +23,12 @@ from rbfrag.vocabulary.quantities import QUANTITIES
 
 _LARGEST_EXPONENT = 709.0
 
+Values = Mapping[str, Any]
+"""What formulas read by name: block, intensity measures and what follows; numbers or arrays."""
+
+Parameters = Sequence[float]
+"""Values of the parameters of a formula, in its order."""
+
 
 class ArrayNamespace(NamedTuple):
     """Elementary functions for formulas, of numbers or of arrays.
@@ -50,13 +56,9 @@ class ArrayNamespace(NamedTuple):
     step_sums: Callable[[Any, Sequence[Any]], tuple[Any, Any]]
 
 
-def _exp(x: float) -> float:
-    return math.exp(x) if x < _LARGEST_EXPONENT else math.inf
-
-
 SINGLE = ArrayNamespace(
-    math.log, _exp, math.sqrt, normal_share, max, min, math.sin, math.cos,
-    normal_quantile, lambda errors, x: errors.step_sums(*x),
+    math.log, lambda x: math.exp(x) if x < _LARGEST_EXPONENT else math.inf, math.sqrt, normal_share,
+    max, min, math.sin, math.cos, normal_quantile, lambda errors, x: errors.step_sums(*x),
 )  # fmt: skip
 """For single numbers."""
 
@@ -160,12 +162,12 @@ class MechanicalBound(NamedTuple):
         how: what answers then, in place of the model.
     """
 
-    holds: Callable[[Mapping[str, Any]], Any]
+    holds: Callable[[Values], Any]
     about: str
     text: str
     how: str = BY_MECHANICS
 
-    def reason(self, values: Mapping[str, Any]) -> str:
+    def reason(self, values: Values) -> str:
         """Return the reason of P = 0 with values by name, or in general where there are none."""
         equal = {
             name: f" = {value:.3g} {QUANTITIES[name].unit}".rstrip()
@@ -185,7 +187,7 @@ _STRONG_KR = 0.3
 """k_r in k' = ln(1 + k_r/0.3): a strong block needs a PGA above k_r, also where PGA is unknown."""
 
 
-def log_strength(v: Mapping[str, Any], ns: ArrayNamespace) -> Any:
+def log_strength(v: Values, ns: ArrayNamespace) -> Any:
     """Return k' = ln(1 + k_r/0.3)."""
     return ns.log(1.0 + v["kr"] / _STRONG_KR)
 
@@ -211,9 +213,8 @@ class BlockParameters:
         criterion: name of the criterion of failure that a model is fitted for, if there are
             several.
         options: names of what else a question may state.
-        stored: what combinations say of their block beside its size, for `adjust`, by name: the
-            values of which fits read combinations, as those between tell them little more; empty
-            for all.
+        stored: stored numbers of a combination's block in addition to its size, for `adjust`, by
+            name: the values whose combinations fits use; empty for all.
         fractions: those of the options that lie between 0 and 1 and whose scatter is one of
             their value; of strength and size it is one of the logarithm.
         adjust: changes the values by what is stated so, before anything reads them.
@@ -255,7 +256,7 @@ class BlockParameters:
         value = diagnostics.get(self.criterion) if self.criterion is not None else None
         return float(value) if isinstance(value, int | float) else None
 
-    def filled(self, values: Mapping[str, Any]) -> dict[str, Any]:
+    def filled(self, values: Values) -> dict[str, Any]:
         """Return arrays with the block's own value where an option is NaN.
 
         Args:
@@ -274,9 +275,7 @@ class BlockParameters:
                 filled[name] = np.where(np.isnan(values[name]), inputs[name], values[name])
         return filled
 
-    def completed(
-        self, inputs: Mapping[str, Any], term: Term, ns: ArrayNamespace
-    ) -> dict[str, Any]:
+    def completed(self, inputs: Values, term: Term, ns: ArrayNamespace) -> dict[str, Any]:
         """Return the inputs with the derived variables of the formulas.
 
         These are ``intensity_m_s`` and, for a block of a size, ``p`` [1/s] and ``y_m_s`` = k g/p.
@@ -354,7 +353,7 @@ class Form:
         start: where the search for the likeliest parameters begins; empty where none is needed.
         size_factor: what eta is multiplied by; None for nothing.
         terms: what each parameter multiplies in the sum that the formula is of, as mathtext; "1"
-            for nothing, empty for a parameter beside the sum.
+            for nothing, empty for a parameter outside the sum.
         equation: eta before the size factor of that sum, <sum>, and of parameters <name>,
             <+name> with their sign, <exp name>, as mathtext.
         where: what the symbols mean, likewise.
@@ -362,7 +361,7 @@ class Form:
     """
 
     parameters: tuple[str, ...]
-    formula: Callable[[Sequence[float], Mapping[str, Any], ArrayNamespace], LinearPredictor]
+    formula: Callable[[Sequence[float], Values, ArrayNamespace], LinearPredictor]
     rank: int
     bounds: tuple[MechanicalBound, ...] = ()
     start: tuple[float, ...] = ()
@@ -373,7 +372,7 @@ class Form:
     advice: str = ""
 
     def unscaled(
-        self, parameters: Sequence[float], values: Mapping[str, Any], ns: ArrayNamespace
+        self, parameters: Sequence[float], values: Values, ns: ArrayNamespace
     ) -> tuple[LinearPredictor, Any]:
         """Return eta and its slopes before the size factor, and the factor.
 
@@ -385,24 +384,12 @@ class Form:
         return formula, 1.0 if self.size_factor is None else self.size_factor.of(values["p"], ns)
 
     def eta(
-        self, parameters: Sequence[float], values: Mapping[str, Any], ns: ArrayNamespace
+        self, parameters: Sequence[float], values: Values, ns: ArrayNamespace
     ) -> LinearPredictor:
         """Return eta and its slopes; arguments as for :meth:`unscaled`."""
         unscaled, h = self.unscaled(parameters, values, ns)
         slopes = tuple(h * slope for slope in unscaled.slopes)
         return unscaled._replace(eta=h * unscaled.eta, slopes=slopes)
-
-
-class FittedVariance(NamedTuple):
-    """Mean and variance of the critical velocity, for a method that fits the variance in bins.
-
-    Args:
-        mean_m_s: mean from the parameters and the intensity [m/s].
-        variance_m2_s2: variance [m²/s²] from them.
-    """
-
-    mean_m_s: Callable[[Sequence[float], Any], Any]
-    variance_m2_s2: Callable[[Sequence[float], Any], Any]
 
 
 @dataclass(frozen=True)
@@ -414,35 +401,35 @@ class Method:
         block: what describes its blocks.
         link: F in P = F(eta).
         forms: its formulas by name of the measure.
-        reads: what it is fitted to: ``outcomes`` of blocks on the grid, or ``critical`` values.
         meaning: what the probability is one of, in words.
-        fit: function that fits it, one of :mod:`rbfrag.fragility.fits`.
+        fit: how it is fitted: to ``outcomes`` of the grid by maximum likelihood, or to critical
+            values by a weighted straight ``line``, by a ``log_line`` through their logarithms, or
+            by any formula with normal dispersion (``censored``); the last two with censoring.
         exponent: name of the parameter that is fitted where the exponent M is asked for.
         failure: words for what a question asks the probability of, from its values and the
             model's criterion; None: the name of the kind.
-        median_of: name of the block's parameter whose median is told beside the probability.
+        median_of: name of the block's parameter whose median is given with the probability.
         doubts: yields (holds, name of the value, text) where the model makes no sense, from
             parameters, values and functions.
-        fitted_variance: mean and variance where the variance is fitted in bins; None elsewhere.
     """
 
     name: str
     block: BlockParameters
     link: Link
     forms: Mapping[str, Form] = field(repr=False)
-    reads: Literal["outcomes", "critical"]
     meaning: str
-    fit: Callable[..., Any]
+    fit: Literal["outcomes", "line", "log_line", "censored"]
     exponent: str | None = None
-    failure: Callable[[Mapping[str, Any], float | None], str] | None = None
+    failure: Callable[[Values, float | None], str] | None = None
     median_of: str | None = None
     doubts: (
-        Callable[
-            [Sequence[float], Mapping[str, Any], ArrayNamespace], Iterator[tuple[Any, str, str]]
-        ]
-        | None
+        Callable[[Sequence[float], Values, ArrayNamespace], Iterator[tuple[Any, str, str]]] | None
     ) = None
-    fitted_variance: FittedVariance | None = None
+
+    @property
+    def reads(self) -> Literal["outcomes", "critical"]:
+        """Data of the fit: outcomes of blocks on the grid, or critical values."""
+        return "outcomes" if self.fit == "outcomes" else "critical"
 
 
 OF_CRITICAL = (

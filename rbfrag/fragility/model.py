@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 import math
-import shlex
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple, cast
 
-from rbfrag.db.model_file import MODEL_FORM, RETIRED, ModelRow
+from rbfrag.db.model_file import MODEL_FORM, ModelRow
 from rbfrag.errors import InputError, ModelError
 from rbfrag.fragility.confidence import ParameterErrors, Quantiles, packed
 from rbfrag.fragility.dependence import Dependence
 from rbfrag.fragility.domain import RATIOS, Ratio, Spread, ratios_of, stored_spread
 from rbfrag.fragility.measures import ABOUT_SCATTER, CREDIBLE, HIGHEST, LOWEST, TERMS, Term
-from rbfrag.fragility.method import TOPPLING_BLOCK, ArrayNamespace, Form, MechanicalBound, Method
+from rbfrag.fragility.method import ArrayNamespace, Form, MechanicalBound, Method
 from rbfrag.fragility.methods import method_named, method_names
 from rbfrag.results.diagnostic import Diagnostic
 
@@ -27,19 +26,14 @@ _SHIPPED = {ratio.name: ratio for ratio in RATIOS if ratio.shipped is not None}
 AT_REST = "unstable without shaking: check dip and friction"
 """Warning of a block that fails without an earthquake."""
 
+IS_ESTIMATED = "dependence_estimated"
+"""Diagnostic of a fit: whether the dependence model was part of it."""
+
 NO_EVENT_RANGE = Diagnostic(
     "no prediction interval for a single earthquake: no dependence model is stored with this "
-    "model (too few earthquakes, sites or components were fitted)",
+    "model; fit it again with dependence, of enough earthquakes, sites and components",
     "no_prediction_interval",
 )
-
-
-class Range(NamedTuple):
-    """Range of a value within which no warning is given."""
-
-    name: str
-    low: float
-    high: float
 
 
 class Answer(NamedTuple):
@@ -84,6 +78,7 @@ class FragilityModel:
         notes: what every answer says of the model.
         spread: how the fitted points scatter; None where the row does not say it.
         data: the database that it is stored in, as people call it; None of a row by itself.
+        complete: returns a row with its dependence model; None where it cannot be estimated.
     """
 
     row: ModelRow
@@ -96,7 +91,8 @@ class FragilityModel:
     notes: tuple[Diagnostic, ...] = ()
     spread: Spread | None = None
     data: str | None = None
-    ranges: dict[tuple[str, ...], tuple[Range, ...]] = field(
+    complete: Callable[[ModelRow], ModelRow] | None = field(default=None, compare=False, repr=False)
+    ranges: dict[tuple[str, ...], list[tuple[str, float, float]]] = field(
         default_factory=dict, compare=False, repr=False
     )
     """What :meth:`clear_ranges` has found for some names."""
@@ -106,20 +102,25 @@ class FragilityModel:
     """What :meth:`ratios_of` has found for some names."""
 
     @classmethod
-    def from_row(cls, row: ModelRow, data: str | None = None) -> FragilityModel:
+    def from_row(
+        cls,
+        row: ModelRow,
+        data: str | None = None,
+        complete: Callable[[ModelRow], ModelRow] | None = None,
+    ) -> FragilityModel:
         """Return the model of a stored row.
 
         Args:
             data: the database that it is stored in, as people call it.
+            complete: returns a row with its dependence model, if it can be estimated.
 
         Raises:
-            ModelError: the model is of an older form, this rbfrag does not know its term or
+            ModelError: the model is of another form, this rbfrag does not know its term or
                 method, or the row is not whole.
         """
-        if row.form < MODEL_FORM:
+        if row.form != MODEL_FORM:
             raise ModelError(
-                f"model {row.name!r} was fitted by an older rbfrag, in an obsolete form: fit it "
-                f"again with  {_fit_line(row)}"
+                f"model {row.name!r} was fitted by another version of rbfrag: fit it again"
             )
         try:
             method: Method | None = method_named(row.method)
@@ -127,11 +128,6 @@ class FragilityModel:
             method = None
         form = method.forms.get(row.term) if method is not None else None
         if method is None or form is None:
-            if (successor := RETIRED.get(f"{row.method}-{row.term}")) is not None:
-                raise ModelError(
-                    f"model {row.name!r} has an obsolete form: use {successor}, fitted by rbfrag "
-                    "fit to the same data"
-                )
             raise ModelError(
                 f"model {row.name!r} is of kind {row.kind}, term {row.term!r} and method "
                 f"{row.method!r}, which is not supported by this version (terms "
@@ -173,15 +169,22 @@ class FragilityModel:
             notes=notes,
             spread=stored_spread(row.name, row.diagnostics),
             data=data,
+            complete=complete,
         )
 
     @property
     def dependence(self) -> Dependence | None:
-        """Gaussian copula of blocks in one earthquake, if stored with the model."""
+        """Gaussian copula of blocks in one earthquake, if stored with the model.
+
+        The first question estimates and stores it where the fit has not.
+        """
+        if self.complete is not None and self.row.diagnostics.get(IS_ESTIMATED) is False:
+            # workers get the row, and all later questions this model
+            object.__setattr__(self, "row", self.complete(self.row))
         stored = self.row.dependence
-        names = Dependence.__dataclass_fields__
-        if stored is None or not set(names) <= set(stored):
+        if stored is None:
             return None
+        names = Dependence.__dataclass_fields__
         return Dependence(**{name: float(cast("float", stored[name])) for name in names})
 
     @property
@@ -197,6 +200,11 @@ class FragilityModel:
     @property
     def uncertain(self) -> bool:
         """True if the model integrates over uncertain blocks or shaking."""
+        return False
+
+    @property
+    def of_uncertain_block(self) -> bool:
+        """True if the block is uncertain; answers then have a standard deviation of P."""
         return False
 
     @property
@@ -256,31 +264,28 @@ class FragilityModel:
         least, most = (math.sqrt(size[i]) * pulse[i] for i in (0, 1))
         return low <= least * (1.0 + 1e-9) and most * (1.0 - 1e-9) <= high
 
-    def clear_ranges(self, values: Collection[str]) -> tuple[Range, ...]:
-        """Return the ranges of values within which no warning is given."""
+    def clear_ranges(self, values: Collection[str]) -> list[tuple[str, float, float]]:
+        """Return the names of values, with the range of each within which no warning is given."""
         key = tuple(values)
         ranges = self.ranges.get(key)
-        if ranges is None:
-            block = self.method.block
-            ranges = self.ranges[key] = tuple(
-                self._clear_range(name)
-                for name in key
-                if name in self.row.domain or name not in block.options
-            )
+        if ranges is not None:
+            return ranges
+        block, domain, ranges = self.method.block, self.row.domain, []
+        for name in key:
+            low, high = LOWEST, HIGHEST
+            if name in block.sigmas or name in ABOUT_SCATTER:
+                low = 0.0
+            elif name in domain or name not in block.options:
+                limits = [domain.get(name, (low, high))]
+                if name in _SHIPPED:
+                    limits = [_SHIPPED[name].limits(domain)]
+                for least, most, *_ in (*limits, CREDIBLE.get(name, (low, high))):
+                    low, high = max(low, least), min(high, most)
+            else:
+                continue
+            ranges.append((name, low, high))
+        self.ranges[key] = ranges
         return ranges
-
-    def _clear_range(self, name: str) -> Range:
-        if name in self.method.block.sigmas or name in ABOUT_SCATTER:
-            return Range(name, 0.0, HIGHEST)
-        low, high = LOWEST, HIGHEST
-        for least, most, *_ in (
-            _SHIPPED[name].limits(self.row.domain)
-            if name in _SHIPPED
-            else self.row.domain.get(name, (low, high)),
-            CREDIBLE.get(name, (low, high)),
-        ):
-            low, high = max(low, least), min(high, most)
-        return Range(name, low, high)
 
     def lies_outside(self, values: dict[str, Any], ns: ArrayNamespace) -> Any:
         """Return whether completed values lie outside the fitted ranges."""
@@ -330,28 +335,3 @@ class FragilityModel:
 
 Model = ModelRow | FragilityModel | str
 """A model as callers give it: itself, as it is stored, or by the name of a stored one."""
-
-
-def _fit_line(row: ModelRow) -> str:
-    """Return the command that repeats the fit of a stored model."""
-    selection = row.diagnostics
-    words = ["rbfrag fit"]
-    if row.kind != TOPPLING_BLOCK.kind:
-        words.append(f"--kind {row.kind}")
-    words += [f"--term {row.term}", f"--method {row.method}"]
-    for option, name in (("suite", "suite"), ("rotation", "rotation_deg")):
-        if selection.get(name) is not None:
-            words.append(f"--{option} {shlex.quote(str(selection[name]))}")
-    if selection.get("vertical", "without") != "without":
-        words.append(f"--vertical {selection['vertical']}")
-    if selection.get("doubtful_pgd"):
-        words.append("--doubtful-pgd")
-    if selection.get("include_structures"):
-        words.append("--include-structures")
-    try:
-        exponent = method_named(row.method).exponent
-    except InputError:
-        exponent = None
-    if exponent in row.coefficients:
-        words.append("--free-m")
-    return " ".join([*words, f"--name {shlex.quote(row.name)}", "--replace"])

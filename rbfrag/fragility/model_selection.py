@@ -1,21 +1,23 @@
-"""Selection of the fragility model for a prediction."""
+"""Stored fragility models: their list, and which of them answers a question.
+
+:func:`suited_models` decides which model answers; the default of a kind, which it prefers, comes
+with the rows (:func:`rbfrag.db.model_file.with_defaults`). No library is loaded here.
+"""
 
 from __future__ import annotations
 
+import math
 import os
-from collections.abc import Collection, Iterable
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from os import PathLike
 from pathlib import Path
+from typing import Any
 
 from rbfrag.db.location import DEFAULT_NAME, REFERENCE, data_place, is_unnamed, reference_file
-from rbfrag.db.model_file import (
-    ModelRow,
-    answers_special_questions,
-    held_out_loss,
-    unknown_model,
-)
+from rbfrag.db.model_file import ModelRow, answers_special_questions, held_out_loss, unknown_model
 from rbfrag.errors import InputError, UnknownModelError
+from rbfrag.fragility.describe import fitted_number
 from rbfrag.fragility.measures import (
     ABOUT_SCATTER,
     MEASURES,
@@ -28,10 +30,12 @@ from rbfrag.fragility.method import TOPPLING_BLOCK, BlockParameters
 from rbfrag.fragility.methods import methods
 from rbfrag.fragility.model import FragilityModel, Model
 from rbfrag.results.diagnostic import Diagnostic
-from rbfrag.vocabulary.quantities import INTENSITY
+from rbfrag.results.numbers import count_of
+from rbfrag.results.result import ResultList, TextLine, TextTable
+from rbfrag.vocabulary.quantities import INTENSITY, word_of
 
 SHIPPED = "the built-in data set"
-"""What answers are said to come from where no other database is named, or is there."""
+"""Name of the data set that answers where no other database is given or exists."""
 
 _Stamp = tuple[int, ...]
 
@@ -47,6 +51,7 @@ class _Store:
 
     Args:
         place: its name in messages.
+        source: path or URL of a database that may be written; None of the built-in data set.
         stamp: what tells whether the file has changed since; () where nothing can.
         rows: the models of all kinds.
         models: those that have answered, by name.
@@ -56,6 +61,7 @@ class _Store:
     place: str
     stamp: _Stamp
     rows: list[ModelRow]
+    source: Path | str | None = None
     models: dict[str, FragilityModel] = field(default_factory=dict)
     suited: dict[tuple[object, ...], list[FragilityModel]] = field(default_factory=dict)
 
@@ -71,8 +77,15 @@ class _Store:
         """Return a model ready for predictions."""
         model = self.models.get(row.name)
         if model is None:
-            model = self.models[row.name] = FragilityModel.from_row(row, data_name(self.place))
+            complete = None if self.source is None else self._with_dependence
+            model = FragilityModel.from_row(row, data_name(self.place), complete)
+            self.models[row.name] = model
         return model
+
+    def _with_dependence(self, row: ModelRow) -> ModelRow:
+        from rbfrag.fragility.fit.stored import with_dependence
+
+        return with_dependence(row, self.source)
 
 
 _SHIPPED = str(REFERENCE)
@@ -110,10 +123,8 @@ def find_model(
     kind: str | None = None,
     rotation_deg: float | None = None,
 ) -> FragilityModel:
-    """Return the model for a block and the given intensity measures.
-
-    Of the stored models that the measures suffice for, one on X(p) answers if there is one, then
-    the database's default, else the one of the least log loss on earthquakes left out.
+    """Return the model for a block and the given intensity measures: the named one, or else the
+    first of :func:`suited_models`.
 
     Args:
         model: a model, the name of a stored one, or None.
@@ -173,6 +184,11 @@ def suited_models(
 ) -> list[FragilityModel]:
     """Return one stored model for each suitable set of intensity measures, the recommended first.
 
+    One of the record's own spectrum X(p), or of the given rotation, comes first, then the chosen
+    default, the lowest log loss on held-out earthquakes, and without scores the most predictors
+    (docs/theory/fragility.md, "Which model answers"). Methods kept for comparison answer where no
+    other does.
+
     Arguments as for :func:`find_model`.
     """
     store, key = _store(db), (tuple(names), kind, rotation_deg)
@@ -186,8 +202,7 @@ def unused_measures(model: FragilityModel, names: Collection[str]) -> tuple[Diag
     read = model.term.inputs
     return tuple(
         Diagnostic(
-            f"{name} was not used: model {model.name} reads {' and '.join(read)}",
-            "unused_measures",
+            f"{name} was not used: model {model.name} uses {' and '.join(read)}", "unused_measures"
         )
         for name in names
         if name in MEASURES and name not in read
@@ -204,17 +219,34 @@ def _suited_in(
             f"{_measures(names)} is given: a prediction requires {_enough(TERMS)}, or a motion",
             fields=INTENSITY,
         )
-    block_of_question = block_of(names)
-    kind = block_of_question.kind if kind is None else kind
+    block = block_of(names)
+    kind = block.kind if kind is None else kind
     if not store.rows:
         raise UnknownModelError(unknown_model(None, [], store.place))
     of_kind = [row for row in store.rows if row.kind == kind]
     if not of_kind:
-        raise UnknownModelError(f"{store.place} has no {kind} model: {_how_to_make(kind)}")
+        from rbfrag.solver.kinds import KINDS
+
+        stored = [name for name, model in sorted(KINDS.items()) if model.parameters]
+        advice = f"make one by rbfrag simulate and rbfrag fit, both of kind {kind}"
+        if kind not in stored:
+            advice = f"there are models of {', '.join(stored)}"
+        raise UnknownModelError(f"{store.place} has no {kind} model: {advice}")
     named = [row.name for row in of_kind if TERMS[row.term].by_name and not row.is_default]
     of_kind = [row for row in of_kind if row.name not in named]
-    suited = sorted((row for row in of_kind if row.term in possible), key=_merit)
-    block = store.model(suited[0]).method.block if suited else block_of_question
+
+    def preference(row: ModelRow) -> tuple[bool, bool, float, int, int]:
+        return (
+            not answers_special_questions(row),
+            not row.is_default,
+            held_out_loss(row),
+            -len(TERMS[row.term].inputs),
+            possible.index(row.term),
+        )
+
+    suited = sorted((row for row in of_kind if row.term in possible), key=preference)
+    if suited:
+        block = store.model(suited[0]).method.block
     if not MEASURES.issuperset(names):
         check_numbers(kind, block, names)
     _check_criterion(kind, block, rotation_deg)
@@ -225,63 +257,33 @@ def _suited_in(
         before = best.get(row.term)
         if before is None:
             best[row.term] = store.model(row)
-        elif _merit(before.row) == _merit(row):  # else it is no better, and its method not loaded
+        elif preference(before.row) == preference(row):
+            # neither has a score: the rank of the methods decides, which loads them
             best[row.term] = min(before, store.model(row), key=lambda model: model.form.rank)
-    if not best:
-        if suited:
-            have = ", ".join(
-                f"{row.name} ({_failure(block.criterion_of(row.diagnostics))})" for row in of_kind
-            )
-            raise UnknownModelError(
-                f"no stored {kind} model of {_failure(rotation_deg)} works with "
-                f"{_measures(names)}; the stored models are for {have}"
-            )
-        raise InputError(
-            f"no stored {kind} model works with {_measures(names)}: give "
-            f"{_enough(row.term for row in of_kind)}{_or_fit(kind, possible)}"
-            + (f"; {' and '.join(named)}: by name alone" if named else ""),
+    if best:
+        usual = [m for m in best.values() if m.form.rank == 0 or m.row.is_default]
+        return usual or [*best.values()]
+    if suited:
+        have = ", ".join(
+            f"{row.name} ({_failure(block.criterion_of(row.diagnostics))})" for row in of_kind
         )
-    # those that are kept for comparison answer where there is no other, or where one was chosen
-    usual = {term: m for term, m in best.items() if m.form.rank == 0 or m.row.is_default}
-    best = usual or best
-    # The best model comes first: one of the record's own spectrum or of the given rotation, then
-    # the chosen default, the lowest log loss on earthquakes held out, the most predictors
-    # (docs/theory/fragility.md, "Which model answers").
-    return sorted(
-        best.values(),
-        key=lambda m: (
-            not answers_special_questions(m.row),
-            *_merit(m.row),
-            # without scores what reads more is taken to be better
-            -len(m.term.inputs),
-            possible.index(m.term.name),
-        ),
-    )
-
-
-def _or_fit(kind: str, terms: Iterable[str]) -> str:
+        raise UnknownModelError(
+            f"no stored {kind} model of {_failure(rotation_deg)} works with "
+            f"{_measures(names)}; the stored models are for {have}"
+        )
     fitted = {name for method in methods() if method.block.kind == kind for name in method.forms}
-    suitable = [name for name in terms if name in fitted and not TERMS[name].by_name]
-    return f", or fit a model of {' or '.join(suitable)}" if suitable else ""
+    terms = [name for name in possible if name in fitted and not TERMS[name].by_name]
+    raise InputError(
+        f"no stored {kind} model works with {_measures(names)}: give "
+        f"{_enough(row.term for row in of_kind)}"
+        + (f", or fit a model of {' or '.join(terms)}" if terms else "")
+        + (f"; {' and '.join(named)}: by name alone" if named else "")
+    )
 
 
 def _enough(terms: Iterable[str]) -> str:
     """Describe the intensity measures that suffice for any of the terms."""
     return ", or ".join(" and ".join(inputs) for inputs in least_inputs(terms))
-
-
-def _how_to_make(kind: str) -> str:
-    from rbfrag.solver.kinds import KINDS
-
-    stored = [name for name, model in sorted(KINDS.items()) if model.parameters]
-    if kind in stored:
-        return f"make one by rbfrag simulate and rbfrag fit, both of kind {kind}"
-    return f"there are models of {', '.join(stored)}"
-
-
-def _merit(row: ModelRow) -> tuple[bool, float]:
-    """Return the sort key of models of one term, the best first."""
-    return not row.is_default, held_out_loss(row)
 
 
 SIDES = ("height_m", "width_m")
@@ -377,21 +379,17 @@ def _store(db: str | PathLike[str] | None) -> _Store:
     store = _in_memory(db)
     if store is not None:
         return store
-    store = _read(db)
+    place, shipped = data_place(db)
+    if not isinstance(place, Path):
+        from rbfrag.db.engine import opened_database
+        from rbfrag.db.models import model_rows
+
+        with opened_database(place, read_only=True) as engine, engine.connect() as connection:
+            return _Store(str(engine.url), (), model_rows(connection), place)
+    store = _unchanged(str(place), shipped) or _read_again(place, shipped)
     if not store.rows and is_unnamed(db) and reference_file() is not None:
         return _unchanged(_SHIPPED, True) or _read_again(REFERENCE, True)
     return store
-
-
-def _read(db: str | PathLike[str] | None) -> _Store:
-    place, shipped = data_place(db)
-    if isinstance(place, Path):
-        return _unchanged(str(place), shipped) or _read_again(place, shipped)
-    from rbfrag.db.engine import opened_database
-    from rbfrag.db.models import model_rows
-
-    with opened_database(place, read_only=True) as engine, engine.connect() as connection:
-        return _Store(str(engine.url), (), model_rows(connection))
 
 
 def models_in_memory(db: str | PathLike[str] | None = None) -> bool:
@@ -422,7 +420,7 @@ def _read_again(path: Path, shipped: bool) -> _Store:
 
     key = str(path)
     stamp = _stamp(key, shipped)
-    store = _Store(SHIPPED if shipped else key, stamp, read_models(path))
+    store = _Store(SHIPPED if shipped else key, stamp, read_models(path), None if shipped else path)
     if stamp:
         _store_cache[key, shipped] = store
     return store
@@ -444,3 +442,57 @@ def _stamp(path: str, shipped: bool) -> _Stamp:
     except OSError:
         return stamp
     return (*stamp, log.st_mtime_ns, log.st_size)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ModelList(ResultList):
+    """The fitted models of a database, by kind, the best of a kind first."""
+
+    models: Sequence[ModelRow]
+
+    def sentences(self) -> Iterator[str]:
+        """Yield the number of models."""
+        yield count_of(len(self.models), "fitted model")
+
+    def lines(self) -> Iterator[TextLine]:
+        """Yield the default of each kind."""
+        defaults = [f"{row['name']} ({row['kind']})" for row in self.rows() if row["is_default"]]
+        if defaults:
+            yield TextLine("Default", ", ".join(defaults))
+
+    def tables(self, *, verbose: bool = False) -> Iterator[TextTable]:  # noqa: ARG002
+        """Yield the models with their predictors and log loss."""
+        headers = ("model", "kind", "predictors", "log loss", "default")
+        losses = [row["log_loss_kr05"] or row["log_loss"] for row in self.rows()]
+        yield TextTable(
+            headers,
+            [
+                (row["name"], row["kind"], ", ".join(map(word_of, row["reads"])),
+                 "" if loss is None else f"{loss:.4f}", "yes" if row["is_default"] else "")
+                for row, loss in zip(self.rows(), losses, strict=True)
+            ],
+        )  # fmt: skip
+
+    def rows(self) -> list[dict[str, Any]]:
+        """Return the models under the keys of the JSON contract."""
+        return [
+            {
+                **{
+                    name: getattr(row, name)
+                    for name in ("name", "kind", "term", "method", "is_default")
+                },
+                "n": fitted_number(row.diagnostics),
+                "reads": list(TERMS[row.term].inputs) if row.term in TERMS else [],
+                "log_loss": _finite(held_out_loss(row, "log_loss_held_out")),
+                "log_loss_kr05": _finite(held_out_loss(row, "log_loss_held_out_kr05")),
+                "events": row.diagnostics.get("events"),
+                "sensitive_share": row.diagnostics.get("sensitive_share"),
+                "domain": dict(row.domain),
+                "created": row.created,
+            }
+            for row in sorted(self.models, key=lambda row: (row.kind, held_out_loss(row)))
+        ]
+
+
+def _finite(loss: float) -> float | None:
+    return loss if loss < math.inf else None

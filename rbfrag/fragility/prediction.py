@@ -41,6 +41,8 @@ OF_EACH_MODEL = (
 OF_POLARITY = ("probability", "ci_low", "ci_high", "intensity_m_s")
 """Keys that are shown of each polarity."""
 
+ERRORS_APART = "beta_sigma_deg='2' etc. put the errors of measurement into the interval"
+
 _OPTIONAL = ("y_m_s", "median_displacement_m", "block_sd", "event_low", "event_high")
 """Keys that a terminal does not show where they do not apply."""
 
@@ -83,6 +85,17 @@ class Prediction(Result):
         drained: of a block with water behind it the same answer without water pressure:
             ``probability``, ``ci_low``, ``ci_high`` and the yield by its name, such as ``kr`` (None
             of a block that is unstable at rest); None of a dry block.
+        uncertainty: with standard deviations of measured fields the ``fraction`` of the variance
+            of the probit of P by ``source``: fields, ``gmm`` (the ground-motion model),
+            ``fragility`` and ``together``; else empty.
+        as_stated: ``probability``, ``ci_low`` and ``ci_high`` of the values as they are stated,
+            without these; None where there are none, and of a block that is unstable as stated.
+        sensitivity: of a block given by its geometry P where one ``field`` is off by a usual
+            measurement error: ``step`` in degrees, or as a fraction of a length, and the ``low``
+            and the ``high`` P; the field that moves P most first.
+        solution: where a probability is asked for, the ``field`` that is changed, its ``value``
+            here and as ``stated``, and of k_r ``added_kr``, the difference; else None.
+        drawn: P of each draw of the measured fields that stands at rest.
         inputs: numbers of the block and measures of the shaking that it is the answer for.
         sites: number of sites of one earthquake that were asked for; None where none were.
         alternatives: the answers of all models that the measures suffice for, the recommended
@@ -111,6 +124,11 @@ class Prediction(Result):
     shaking: dict[str, dict[str, float]] | None = None
     how: str = ""
     drained: dict[str, float | None] | None = None
+    uncertainty: tuple[dict[str, Any], ...] = ()
+    as_stated: dict[str, float] | None = None
+    sensitivity: tuple[dict[str, Any], ...] = ()
+    solution: dict[str, Any] | None = None
+    drawn: tuple[float, ...] = field(default=(), compare=False, repr=False)
     inputs: Mapping[str, Any] = field(default_factory=dict, compare=False, repr=False)
     sites: int | None = field(default=None, repr=False)
     alternatives: tuple[Prediction, ...] = field(default=(), compare=False, repr=False)
@@ -128,8 +146,15 @@ class Prediction(Result):
             yield "   ".join(filter(None, (f"{name} = {p:g}", reason, f"({self.how})")))
             return
         # a model forbids nothing: where its P is 0 to rounding, a bound is printed
-        p, low, high = (min(max(v, TINY), 1.0 - TINY) for v in (p, self.ci_low, self.ci_high))
-        yield f"{equals(name, percent(p))}   ({confidence(self.level, interval(low, high))})"
+        values = p, self.ci_low, self.ci_high
+        p, low, high = (0.0 if v is None else min(max(v, TINY), 1.0 - TINY) for v in values)
+        if vars(self)["ci_low"] is None:  # much of the measured range has no answer
+            yield f"{equals(name, percent(p))}   (no interval)"
+            return
+        kind = "uncertainty" if self.uncertainty else "confidence"
+        ends = confidence(self.level, interval(low, high), kind)
+        exact = ", dimensions exact" if self.sensitivity else ""
+        yield f"{equals(name, percent(p))}   ({ends}{exact})"
 
     @property
     def _is_by_mechanics(self) -> bool:
@@ -143,6 +168,7 @@ class Prediction(Result):
 
     def lines(self) -> Iterator[TextLine]:
         """Yield the inputs, the prediction interval, the drained bound and the model."""
+        yield from self._about_uncertainty()
         if shaking := describe.shaking(self.shaking or {}, self.inputs):
             yield TextLine("Shaking", shaking)
         if self.sites is not None:
@@ -160,6 +186,20 @@ class Prediction(Result):
             return
         inside = "within" if self.in_domain else "outside"
         yield TextLine("Model", f"{self.model}, {self.data}; inputs {inside} the fitted range")
+
+    def _about_uncertainty(self) -> Iterator[TextLine]:
+        """Yield the answer as stated, the sources of the interval and the sensitivity."""
+        if self.solution is not None:
+            yield TextLine("Solution", describe.solution(self.solution))
+        if self.as_stated is not None:
+            p, low, high = self.as_stated.values()
+            text = f"{percent(p)}     (fragility parameters alone {interval(low, high)})"
+            yield TextLine("As stated", text)
+        if sources := describe.sources(self.uncertainty, self.inputs):
+            yield TextLine("Sources", sources)
+        if self.sensitivity:
+            yield TextLine("Sensitivity", describe.sensitivity(self.sensitivity))
+            yield TextLine("", ERRORS_APART)
 
     def _at_sites(self, sites: int) -> str:
         where = f"in one earthquake at {sites:,g} such site{'s' if sites > 1 else ''}"
@@ -190,8 +230,8 @@ class Prediction(Result):
     def as_dict(self) -> dict[str, Any]:
         """Return the prediction under the keys of the JSON contract."""
         values = {"kind": self.kind, "mode": self.mode, **vars(self)}
-        values["warnings"] = list(self.warnings)
-        del values["inputs"], values["alternatives"]
+        values |= {n: [*values[n]] for n in ("warnings", "uncertainty", "sensitivity")}
+        del values["inputs"], values["alternatives"], values["drawn"]
         if self.sites is None:
             del values["sites"]
         if self.alternatives:
@@ -300,8 +340,7 @@ def answer_given(
         if model is certain and singles is not None and scatter.single:
             model = ShakenModel.over(certain, scatter=scatter)
         else:
-            from rbfrag.fragility.shaking_points import GroundMotionQuadrature
-            from rbfrag.fragility.uncertain import UncertainModel
+            from rbfrag.fragility.uncertain import GroundMotionQuadrature, UncertainModel
 
             points, possible = (
                 GroundMotionQuadrature(certain, scatter),
@@ -363,10 +402,9 @@ NOT_SHARED = Diagnostic(
 def _shaken_at_sites(
     answer: A, model: FragilityModel, sites: int, inputs: Mapping[str, ArrayLike]
 ) -> A:
+    from rbfrag.fragility.joint import shaken_share_range
     from rbfrag.fragility.shaking import Scatter
-    from rbfrag.fragility.shaking_points import GroundMotionQuadrature
-    from rbfrag.fragility.shared_shaking import shaken_share_range
-    from rbfrag.fragility.uncertain import UncertainModel, uncertain_model
+    from rbfrag.fragility.uncertain import GroundMotionQuadrature, UncertainModel, uncertain_model
 
     scatter, rest = Scatter.of(model.term, inputs)
     if scatter is None or model.dependence is None or scatter.names[0] != "pgv_m_s":
@@ -463,8 +501,9 @@ def _answer_single(
         else method.failure(inputs, model.criterion),
         y_m_s=values.get("y_m_s"), intensity_m_s=x, in_domain=in_domain, warnings=warnings,
         pgv_over_pga_s=values.get("pgv_over_pga_s"), median_displacement_m=median,
-        block_sd=block_sd, data=model.data, shaking=None, how=how, drained=None, inputs=inputs,
-        sites=None, alternatives=(),
+        block_sd=block_sd, data=model.data, shaking=None, how=how, drained=None, uncertainty=(),
+        as_stated=None, sensitivity=(), solution=None, drawn=(), inputs=inputs, sites=None,
+        alternatives=(),
     )  # fmt: skip
     return result
 

@@ -14,11 +14,15 @@ from numpy.typing import NDArray
 
 from rbfrag.errors import InputError
 from rbfrag.fragility.confidence import Quantiles
-from rbfrag.fragility.invalid_rows import describe_invalid
 from rbfrag.fragility.measures import ABOUT_SCATTER
 from rbfrag.fragility.method import ArrayNamespace, arrays
 from rbfrag.fragility.model import AT_REST, Answer, FragilityModel
-from rbfrag.fragility.validation import NOTABLE_SHARE, Remark, answer_with_findings
+from rbfrag.fragility.validation import (
+    NOTABLE_SHARE,
+    Remark,
+    answer_with_findings,
+    describe_invalid,
+)
 from rbfrag.results.diagnostic import Diagnostic, diagnostics, texts_by_row
 from rbfrag.results.numbers import count_of, interval
 from rbfrag.results.result import Result, TextLine
@@ -34,12 +38,18 @@ T = TypeVar("T")
 Texts = NDArray[np.object_]
 ReasonPart = tuple[NDArray[np.intp], Texts | Callable[[], Texts]]
 
+Columns = dict[str, NDArray[Any]]
+"""Flat arrays to be filled, by name."""
+
 OF_ARRAYS = (
     "probability", "ci_low", "ci_high", "event_low", "event_high", "block_sd", "in_domain", "how",
     "reason", "kind", "kinds", "modes", "level", "model", "term", "method", "data", "warnings",
-    "drained",
+    "drained", "as_stated", "sensitivity", "uncertainty",
 )  # fmt: skip
 """Keys of the JSON document."""
+
+_BY_NAME = ("drained", "as_stated", "sensitivity", "uncertainty")
+"""Keys with several columns each."""
 
 CHUNK = 1 << 14
 """Rows that are worked on at a time: what they need stays near the processor."""
@@ -96,10 +106,18 @@ class PredictionArray(Result):
         kind_codes: kind of each element, a place among all kinds, -1 for none; None where all are
             of one kind.
         mode_codes: failure mode of each, a place among all modes, -1 where it is not known.
+        state_codes: why elements have no answer, 1 and the place among
+            :data:`rbfrag.question.shape_validation.STATES`, 0 for others; None for none.
         read: fields of the blocks that the answer depends on, where some stated more.
         ruled: what answered in place of a model; read it by :attr:`how`.
         drained: ``probability``, ``ci_low`` and ``ci_high`` of the blocks without water pressure,
             NaN for dry blocks; None where all are dry.
+        as_stated: with standard deviations of measured fields the same of the values as they are
+            stated, NaN for blocks that are unstable as stated; None without.
+        sensitivity: on request P at usual errors of each measured field, by the name of the field
+            with ``_low`` and ``_high``; None where it is not asked for.
+        uncertainty: with it, fractions of the variance of the probit of P by source, NaN for blocks
+            without errors of measurement; None without.
     """
 
     kind: str
@@ -122,9 +140,13 @@ class PredictionArray(Result):
     index: pd.Index | None = None
     kind_codes: NDArray[np.int8] | None = None
     mode_codes: NDArray[np.int8] | None = None
+    state_codes: NDArray[np.int8] | None = None
     read: frozenset[str] = frozenset()
     ruled: Reasons | None = None
     drained: Mapping[str, FloatArray] | None = None
+    as_stated: Mapping[str, FloatArray] | None = None
+    sensitivity: Mapping[str, FloatArray] | None = None
+    uncertainty: Mapping[str, FloatArray] | None = None
 
     @property
     def how(self) -> NDArray[np.object_]:
@@ -186,8 +208,9 @@ class PredictionArray(Result):
         """Return the predictions under the keys of the JSON contract; NaN becomes null."""
         values = {name: getattr(self, name) for name in OF_ARRAYS}
         values["warnings"] = [*self.warnings]
-        if self.drained is not None:
-            values["drained"] = {name: column.tolist() for name, column in self.drained.items()}
+        for name in _BY_NAME:
+            if (columns := values[name]) is not None:
+                values[name] = {n: column.tolist() for n, column in columns.items()}
         return {n: v.tolist() if hasattr(v, "tolist") else v for n, v in values.items()}
 
     def table_columns(self) -> dict[str, Any]:
@@ -195,27 +218,18 @@ class PredictionArray(Result):
         columns = super().table_columns()
         kinds = {"kind": self.kinds.ravel(), "mode": self.modes.ravel()}
         readable = {n: column for n, column in columns.items() if not n.endswith("_codes")}
-        drained = {f"drained_{n}": column.ravel() for n, column in (self.drained or {}).items()}
+        more = {
+            f"{bound}_{n}": column.ravel()
+            for bound in _BY_NAME
+            for n, column in (getattr(self, bound) or {}).items()
+        }
         last = {"how": self.how.ravel(), "reason": self.reason.ravel()}
-        return {**readable, **kinds, **drained, **last}
+        return {**readable, **kinds, **more, **last}
 
     def to_frame(self) -> pd.DataFrame:
         """Return the predictions as a pandas DataFrame, with the index of the input Series."""
         frame = super().to_frame()
         return frame if self.index is None else frame.set_axis(self.index)
-
-
-@dataclass(frozen=True, eq=False)
-class _Columns:
-    """Result arrays to be filled, flat."""
-
-    probability: FloatArray
-    low: FloatArray
-    high: FloatArray
-    y: FloatArray
-    x: FloatArray
-    in_domain: NDArray[np.bool_]
-    block_sd: FloatArray | None = None
 
 
 def predict_many(
@@ -242,14 +256,14 @@ def predict_many(
     values, shape = flat(inputs)
     size = int(np.prod(shape))
     ns = arrays()
-    p, low, high, y, x = np.empty((5, size))
-    out = _Columns(
-        p, low, high, y, x, np.ones(size, dtype=np.bool_),
-        np.empty(size) if model.uncertain else None,
-    )  # fmt: skip
+    names = ("probability", "low", "high", "y_m_s", "intensity_m_s")
+    out: Columns = dict(zip(names, np.empty((5, size)), strict=True))
+    out["in_domain"] = np.ones(size, dtype=np.bool_)
+    if model.of_uncertain_block:
+        out["block_sd"] = np.empty(size)
     reach = quantiles if interval else None
     if not interval:
-        out.low[:] = out.high[:] = np.nan
+        out["low"][:] = out["high"][:] = np.nan
 
     def answer(start: int) -> NDArray[np.intp]:
         part = slice(start, min(start + CHUNK, size))
@@ -271,23 +285,24 @@ def predict_many(
             )
 
     explained = _in_chunks(explain, flagged.size)
+    out = {name: column.reshape(shape) for name, column in out.items()}
     return PredictionArray(
         kind=model.kind,
-        probability=out.probability.reshape(shape),
-        ci_low=out.low.reshape(shape),
-        ci_high=out.high.reshape(shape),
+        probability=out["probability"],
+        ci_low=out["low"],
+        ci_high=out["high"],
         event_low=np.full(shape, np.nan),
         event_high=np.full(shape, np.nan),
-        in_domain=out.in_domain.reshape(shape),
+        in_domain=out["in_domain"],
         reasons=Reasons(shape, [(indices, texts) for indices, texts, *_ in explained]),
-        y_m_s=out.y.reshape(shape),
-        intensity_m_s=out.x.reshape(shape),
+        y_m_s=out["y_m_s"],
+        intensity_m_s=out["intensity_m_s"],
         level=quantiles.level,
         model=model.name,
         term=model.term.name,
         method=model.method.name,
         warnings=diagnostics(model.notes, *(warnings for *_, warnings in explained)),
-        block_sd=None if out.block_sd is None else out.block_sd.reshape(shape),
+        block_sd=out.get("block_sd"),
         data=model.data,
         index=index if shape == (0 if index is None else len(index),) else None,
         ruled=Reasons(shape, [(indices, how) for indices, _, how, _ in explained]),
@@ -329,7 +344,7 @@ def _answer_part(
     inputs: Mapping[str, FloatArray],
     quantiles: Quantiles | None,
     part: slice,
-    out: _Columns,
+    out: Columns,
     ns: ArrayNamespace,
 ) -> NDArray[np.intp]:
     """Fill the predictions of a part; return the indices that need warnings."""
@@ -350,10 +365,10 @@ def _answer_part(
     answer = model.answer(values, quantiles, ns, inputs)
     if answer.outside is not None:
         clear &= answer.outside < NOTABLE_SHARE
-    for column, value in _answered(out, answer):
-        column[part] = value
-    out.y[part] = values.get("y_m_s", np.nan)
-    out.x[part] = values["intensity_m_s"]
+    for name, value in _answered(out, answer):
+        out[name][part] = value
+    out["y_m_s"][part] = values.get("y_m_s", np.nan)
+    out["intensity_m_s"][part] = values["intensity_m_s"]
     return np.flatnonzero(~clear)
 
 
@@ -363,7 +378,7 @@ def _answer_with_diagnostics(
     quantiles: Quantiles | None,
     indices: NDArray[np.intp],
     shape: tuple[int, ...],
-    out: _Columns,
+    out: Columns,
     *,
     reject_nan: bool,
 ) -> tuple[Texts, Texts, list[Diagnostic]]:
@@ -406,26 +421,23 @@ def _answer_with_diagnostics(
         say=say, reject=reject, unstable=unstable,
         nothing=np.zeros(indices.size, dtype=np.bool_),
     )  # fmt: skip
-    for column, answer in _answered(out, judgement.answer):
+    for name, answer in _answered(out, judgement.answer):
         values = np.where(judgement.ruled, 0.0, answer)
-        values[at_rest] = 0.0 if column is out.block_sd else 1.0
+        values[at_rest] = 0.0 if name == "block_sd" else 1.0
         values[judgement.missing] = np.nan
-        column[indices] = values
+        out[name][indices] = values
     y = judgement.values.get("y_m_s", np.nan)
-    for column, value in ((out.y, y), (out.x, judgement.intensity_m_s)):
-        column[indices] = np.where(judgement.missing, np.nan, value)
-    out.in_domain[indices] = judgement.in_domain
+    for name, value in (("y_m_s", y), ("intensity_m_s", judgement.intensity_m_s)):
+        out[name][indices] = np.where(judgement.missing, np.nan, value)
+    out["in_domain"][indices] = judgement.in_domain
     size = indices.size
     return texts_by_row(reasons, size, "; "), texts_by_row(ruled, size, "; "), warnings
 
 
-def _answered(out: _Columns, answer: Answer) -> list[tuple[FloatArray, Any]]:
-    """Return the columns that a model fills, each with its values."""
-    pairs = (
-        (out.probability, answer.probability), (out.low, answer.low), (out.high, answer.high),
-        (out.block_sd, answer.block_sd),
-    )  # fmt: skip
-    return [(column, value) for column, value in pairs if column is not None and value is not None]
+def _answered(out: Columns, answer: Answer) -> list[tuple[str, Any]]:
+    """Return the names of the columns that a model fills, each with its values."""
+    pairs = zip(Answer._fields, answer, strict=True)
+    return [(name, value) for name, value in pairs if name in out and value is not None]
 
 
 def flat(inputs: Mapping[str, object]) -> tuple[dict[str, FloatArray], tuple[int, ...]]:

@@ -63,8 +63,8 @@ def predict_motion(
     if weights is not None:
         raise InputError(f"weights cannot be combined with a motion: {SIMULATED}")
     motion = as_motion(motion)
-    beside = {*INTENSITY, *ABOUT_SCATTER, *NOT_OF_A_RECORD} - {*UNRECORDED}
-    extra = [name for name in inputs if name in beside]
+    rejected = {*INTENSITY, *ABOUT_SCATTER, *NOT_OF_A_RECORD} - {*UNRECORDED}
+    extra = [name for name in inputs if name in rejected]
     if extra:
         raise InputError(
             f"{' and '.join(extra)} cannot be combined with a motion, which has them: omit them"
@@ -88,14 +88,18 @@ def predict_motion(
         model, (*block, *measures, *computed), db, kind=kind, rotation_deg=rotation_deg
     )
     answers: dict[str, Prediction] = {}
-    for direction in ("forward", "reverse") if polarity == "both" else (polarity,):
+    directions: tuple[Literal["forward", "reverse"], ...] = (
+        ("forward", "reverse") if polarity == "both" else (polarity,)
+    )
+    for direction in directions:
         motion_inputs = {**block, **measures}
         for name in computed.intersection(chosen.term.inputs):
-            motion_inputs[name] = (
-                motion.spectral_accelerations[name]
-                if name in SPECTRAL.values()
-                else _spectrum_of(motion, block["p2"], direction)
-            )
+            if name in SPECTRAL.values():
+                motion_inputs[name] = motion.spectral_accelerations[name]
+            else:
+                # a p2 that cannot be used is rejected by the prediction
+                p2 = block["p2"] if 0.0 < block["p2"] < math.inf else 1.0
+                motion_inputs[name] = float(toppling_spectrum(motion, p2, direction))
         answer = answer_given(chosen, motion_inputs, level)
         assert isinstance(answer, Prediction)
         answers[direction] = add_warnings(answer, unused_measures(chosen, block))
@@ -140,10 +144,3 @@ def measures_of(motion: GroundMotion) -> dict[str, float]:
     """
     measures = vars(motion.measures).items()
     return {name: value for name, value in measures if name in INTENSITY and value is not None}
-
-
-def _spectrum_of(motion: GroundMotion, p2: float, polarity: Literal["forward", "reverse"]) -> float:
-    """Return the toppling spectrum X(p) [m/s]."""
-    # a p2 that cannot be used is rejected by the prediction
-    drawn = p2 if math.isfinite(p2) and p2 > 0.0 else 1.0
-    return float(toppling_spectrum(motion, drawn, polarity))

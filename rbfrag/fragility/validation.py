@@ -1,24 +1,35 @@
 """Validation of the inputs of a prediction, and the prediction where warnings apply.
 
 Every check is written once and looks at single numbers or at arrays. No sentence holds a
-semicolon, which separates the reasons of an array's element.
+semicolon, which separates the reasons of an array's element. Only functions of arrays load numpy.
+
+Every command that takes tables of blocks answers the rows that it can, gives the others NaN and
+the reason (:func:`block_reasons`), and counts them (:func:`describe_invalid`). An answer that needs
+all rows, or a table of which none can be used, is rejected by :func:`reject`.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from functools import partial
+from typing import TYPE_CHECKING, Any, NamedTuple, NoReturn
 
+from rbfrag.errors import InputError
 from rbfrag.fragility.confidence import Quantiles
-from rbfrag.fragility.domain import RATIOS, Ratio
+from rbfrag.fragility.domain import RATIOS
 from rbfrag.fragility.measures import AMPLIFIED, CREDIBLE, HIGHEST, LOWEST
-from rbfrag.fragility.method import ArrayNamespace
+from rbfrag.fragility.method import ArrayNamespace, BlockParameters, arrays
 from rbfrag.fragility.model import LEAST, Answer, FragilityModel
+from rbfrag.results.diagnostic import Diagnostic
 from rbfrag.results.numbers import exact_percent
 from rbfrag.solver.kinds import BY_MECHANICS
 from rbfrag.vocabulary.quantities import INPUTS, INTENSITY, NUMBERS, QUANTITIES
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
 
 
 def _unit(name: str) -> str:
@@ -52,7 +63,8 @@ class Remark:
     Args:
         holds: whether (where) it is so.
         name: the value concerned.
-        text: what is wrong and what to do.
+        text: what is wrong and what to do; where it depends on other values, a function of the
+            value, or of None for many values.
         how: what answers there, in place of the model; empty where the model does.
         code: of the warning, one of :data:`rbfrag.results.diagnostic.CODES`; that of a reason
             against any answer is that of rejected rows.
@@ -61,12 +73,14 @@ class Remark:
     holds: Any
     name: str
     value: Any
-    text: str
+    text: str | Callable[[float | None], str]
     how: str = ""
     code: str = "rows_rejected"
 
     def about(self, value: float) -> str:
         """Return the sentence for one value."""
+        if not isinstance(self.text, str):
+            return self.text(value)
         if not self.name:
             return self.text
         unit = _unit(self.name)
@@ -74,30 +88,9 @@ class Remark:
 
     def in_general(self) -> str:
         """Return the sentence for many values."""
+        if not isinstance(self.text, str):
+            return self.text(None)
         return f"{_word(self.name)} {self.text}" if self.name else self.text
-
-
-@dataclass(frozen=True, kw_only=True)
-class Contradiction(Remark):
-    """Intensity measures that are inconsistent: their combination occurs in no fitted motion.
-
-    Args:
-        ratio: what is out of its range.
-        fitted: least and greatest ratio of the fitted motions; None where the model says nothing
-            of it.
-    """
-
-    ratio: Ratio
-    values: Mapping[str, Any]
-    fitted: tuple[float, float] | None
-
-    def about(self, value: float) -> str:
-        """Return the sentence for one value."""
-        return self.ratio.contradiction(self.values, value, self.fitted)
-
-    def in_general(self) -> str:
-        """Return the sentence for many values."""
-        return self.ratio.in_general(self.fitted)
 
 
 _RATIO_NAMES = frozenset(ratio.name for ratio in RATIOS)
@@ -213,7 +206,11 @@ def answer_with_findings(
         text = bound.reason(values if nothing is False else {})
         say(holds, Remark(holds, "", 0.0, text, bound.how, "by_mechanics"))
         ruled = ruled | holds
-    answer = _never(model) if ruled is True else model.answer(values, quantiles, ns, floored)
+    if ruled is True:  # a single block, which cannot fail or has no answer
+        of_block = (0.0, 0.0) if model.uncertain else (None, None)
+        answer = Answer(0.0, 0.0, 0.0, None, None, *of_block)
+    else:
+        answer = model.answer(values, quantiles, ns, floored)
     if answer.outside is not None:
         partly = (answer.outside >= NOTABLE_SHARE) & _not(ruled)
         say(partly, Remark(partly, "", answer.outside, PARTLY_OUTSIDE, code="extrapolation"))
@@ -233,12 +230,6 @@ def answer_with_findings(
     return Judgement(answer, values, intensity, missing, in_domain, ruled)
 
 
-def _never(model: FragilityModel) -> Answer:
-    """Return P = 0 where mechanics rules out the failure of a single block."""
-    of_block = (0.0, 0.0) if model.uncertain else (None, None)
-    return Answer(0.0, 0.0, 0.0, None, None, *of_block)
-
-
 def _not(condition: Any) -> Any:
     return condition ^ True
 
@@ -249,10 +240,8 @@ def outside_domain(model: FragilityModel, values: Mapping[str, Any]) -> Iterator
         low, high = ratio.limits(model.row.domain)
         value = values[ratio.name]
         outside = (value < low * (1.0 - 1e-9)) | (value > high * (1.0 + 1e-9))
-        fitted = model.row.domain.get(ratio.name)
-        yield Contradiction(
-            outside, "", value, "", "", "extrapolation", ratio=ratio, values=values, fitted=fitted
-        )
+        text = partial(ratio.contradiction, values, model.row.domain.get(ratio.name))
+        yield Remark(outside, "", value, text, code="extrapolation")
     for name, (low, high) in model.row.domain.items():
         if name not in values or name in _RATIO_NAMES:
             continue
@@ -283,3 +272,140 @@ def doubts(
             value = values[name]
             strange = (value < low) | (value > high)
             yield Remark(strange, name, value, f"is {text}", code="suspicious_value")
+
+
+FROM_SUMS = " and are left out of all sums, which are lower bounds"
+"""What becomes of such blocks where numbers of several are added."""
+
+FROM_MEAN = " and are left out of the mean"
+"""The same where the answer is a mean over blocks."""
+
+FIRST = 6
+"""So many of them are named."""
+
+_MOST_CHARACTERS = 260
+
+
+def block_reasons(
+    block: BlockParameters, values: Mapping[str, NDArray[np.float64]]
+) -> NDArray[np.object_]:
+    """Return why blocks cannot fail in an earthquake, in the words of `predict`; empty where they
+    can.
+
+    Args:
+        values: parameters of the block, options and standard deviations, if there are any, by the
+            names of :func:`rbfrag.predict`, shape (m,) each; an option may be NaN for the block's
+            own.
+    """
+    import numpy as np
+
+    reasons = np.full(values[block.strength].shape, "", dtype=object)
+
+    def say(finding: Remark) -> None:
+        for i in np.flatnonzero(finding.holds & (reasons == "")).tolist():
+            value = float(finding.value[i])
+            reasons[i] = finding.in_general() if value != value else finding.about(value)
+
+    names = [name for name in (*block.options, *block.sigmas) if name in values]
+    with np.errstate(all="ignore"):
+        filled = block.filled(values)
+        for finding in rejections(filled, (*block.names, *names), (block.strength, *block.options)):
+            say(finding)
+        strength = filled[block.strength]
+        unstable = "is not above zero: the block is unstable and fails without an earthquake"
+        say(Remark(strength <= 0.0, block.strength, strength, unstable))
+        adjusted = dict(filled)
+        if block.adjust is not None:
+            block.adjust(adjusted, arrays())
+        for bound in block.rejects:
+            if bound.about in names:
+                say(Remark(bound.holds(adjusted), bound.about, filled[bound.about], bound.text))
+    return reasons
+
+
+def describe_invalid(
+    count: int, total: int, labels: Sequence[str], reasons: Sequence[str], effect: str = ""
+) -> tuple[Diagnostic, ...]:
+    """Describe the rejected blocks; empty if there are none.
+
+    Args:
+        labels: where they stand, or the first.
+        reasons: why they could not be used.
+        effect: what becomes of them in numbers of several blocks; those of a mean have no row.
+    """
+    if not count:
+        return ()
+    number = f"{count:,} of {total:,} blocks could not be used{effect}"
+    if effect == FROM_MEAN:
+        return (Diagnostic(f"{number}: {in_list(labels, reasons)}", "rows_rejected"),)
+    which = "it is" if count == 1 else "the first is"
+    text = f"{number}; the reasons stand in the column reason; {which} {labels[0]}: {reasons[0]}"
+    return (Diagnostic(text, "rows_rejected"),)
+
+
+def reject(
+    source: str, labels: Sequence[str], reasons: Sequence[str], total: int, why: str = ""
+) -> NoReturn:
+    """Reject a table in which some or all blocks are invalid.
+
+    Args:
+        source: what messages call them.
+        labels: where those stand that cannot be used; if none can, of the first.
+        reasons: why each cannot be used.
+        why: why the others do not do; empty where there are no others.
+    """
+    if not why or len(labels) == total:
+        listed = in_list(labels[:FIRST], reasons[:FIRST])
+        if total == 1:
+            raise InputError(f"{source}: invalid block: {listed}")
+        more = f", the first {FIRST}" if total > FIRST else ""
+        raise InputError(f"{source}: none of {total:,} blocks is valid{more}: {listed}")
+    raise InputError(
+        f"{source}: {len(labels):,} of {total:,} blocks are invalid, and {why}: "
+        f"{in_list(labels, reasons)}: correct or remove these rows"
+    )
+
+
+def reject_elements(
+    reasons: NDArray[np.object_], why: str = "", fields: Collection[str] = ()
+) -> None:
+    """Reject arrays with invalid elements; without `why` only if all are invalid.
+
+    Args:
+        reasons: of each element, empty where it can be used, shape (m,).
+        why: why the others do not do.
+        fields: fields in the reason that each interface prints in its own spelling.
+    """
+    wrong = elements(reasons)
+    if reasons.size == 1 and wrong:
+        raise InputError(reasons[0], fields=fields)
+    if wrong and (why or len(wrong) == reasons.size):
+        reject("blocks", wrong, [text for text in reasons.tolist() if text], reasons.size, why)
+
+
+def elements(reasons: NDArray[np.object_]) -> list[str]:
+    """Return the indices of invalid elements of an array."""
+    import numpy as np
+
+    return [f"element {i}" for i in np.flatnonzero(reasons != "").tolist()]
+
+
+def in_list(labels: Iterable[str], reasons: Iterable[str]) -> str:
+    """Describe blocks with their reasons in one phrase: grouped by reason, as many as fit.
+
+    Args:
+        labels: where each stands, as "line 3 (block A7)".
+        reasons: why it cannot be used.
+    """
+    alike: dict[str, list[str]] = {}
+    for place, reason in zip(labels, reasons, strict=True):
+        alike.setdefault(reason, []).append(place)
+    text, unlisted = "", sum(map(len, alike.values()))
+    for reason, members in alike.items():
+        more = f" and {len(members) - FIRST:,} more" if len(members) > FIRST else ""
+        phrase = f"{', '.join(members[:FIRST])}{more}: {reason}"
+        if text and len(text) + len(phrase) > _MOST_CHARACTERS:
+            break
+        text += f"{'; ' if text else ''}{phrase}"
+        unlisted -= len(members)
+    return text + (f"; and {unlisted:,} more" if unlisted else "")

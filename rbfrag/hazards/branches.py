@@ -32,13 +32,14 @@ def curve_name(curve: HazardCurve) -> str:
     return curve.statistic or curve.source
 
 
-def quantile_warning(curve: HazardCurve, answer: str) -> Iterator[Diagnostic]:
-    """Yield a warning if a curve is a quantile of the hazard.
+def curve_warnings(curve: HazardCurve, answer: str) -> Iterator[str]:
+    """Yield the warnings of a curve, and one if it is a quantile of the hazard.
 
     Args:
         curve: the hazard curve.
         answer: the quantity that is computed from it.
     """
+    yield from curve.warnings
     if curve.statistic.startswith("quantile"):
         yield Diagnostic(
             f"{curve.statistic} is not a realization of the hazard, and {answer} under it is not "

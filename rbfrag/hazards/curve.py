@@ -1,24 +1,27 @@
-"""Seismic hazard curves: annual rates of exceedance against the level of shaking."""
+"""Seismic hazard curves, and the intensity measures of their levels by OpenQuake names."""
 
 from __future__ import annotations
 
 import os
+import re
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, TypedDict, Unpack
+from typing import Any, TypedDict
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from rbfrag.errors import InputError
 from rbfrag.fragility.measures import ALONE
-from rbfrag.question.shaking import doubts_about, doubts_about_rates
+from rbfrag.question.shaking import doubts_about
 from rbfrag.results.diagnostic import Diagnostic
+from rbfrag.results.numbers import NEVER, annual_rate, percent
 from rbfrag.results.result import Tabular
 from rbfrag.solver.results import FloatArray
-from rbfrag.vocabulary.quantities import QUANTITIES, SPECTRAL
+from rbfrag.vocabulary.quantities import MEASURES, QUANTITIES, SPECTRAL
 
-MEASURES = ("pga_g", "pgv_m_s", "sa_g")
+CURVE_MEASURES = ("pga_g", "pgv_m_s", "sa_g")
 """What the levels of a curve may be, with the unit."""
 
 ANSWERED = "PGV, SA(1), PGA"
@@ -36,23 +39,12 @@ class CurveKeywords(TypedDict, total=False):
     disaggregation: str | os.PathLike[str] | None
 
 
-class _CurveSite(TypedDict, total=False):
-    """Site, measure and logic-tree statistic of a curve; see :class:`HazardCurve`."""
-
-    period_s: float | None
-    site: str
-    lon: float | None
-    lat: float | None
-    statistic: str
-    component: str
-
-
 @dataclass(frozen=True, eq=False, repr=False)
 class HazardCurve(Tabular):
     """Annual rates of exceedance at increasing levels of one intensity measure.
 
     Args:
-        measure: one of `MEASURES`.
+        measure: one of `CURVE_MEASURES`.
         levels: levels of the measure in the unit it names, rising, shape (n,).
         annual_rate: mean number of exceedances a year [1/a], never rising, all above zero,
             shape (n,).
@@ -150,7 +142,22 @@ def rates_from_probabilities(probability: FloatArray, years: float) -> FloatArra
     return -np.log1p(-probability) / years
 
 
+def probability_in(years: float, annual_rate: FloatArray) -> FloatArray:
+    """Return the probability of at least one failure in T years, 1 - exp(-λT) (Poisson)."""
+    return np.asarray(-np.expm1(-annual_rate * checked_years(years)))
+
+
+def checked_years(years: float) -> float:
+    """Return a period [a] after checking that it is positive and finite."""
+    if not np.isfinite(years) or years <= 0.0:
+        raise InputError(f"years = {years:g}: give a period above 0 years")
+    return years
+
+
 _SELDOM = 1e-6
+
+_MOST_A_YEAR = 100.0
+"""Rates of exceedance above this are of another unit, or of no earthquakes [1/a]."""
 
 
 def hazard_curve(
@@ -159,7 +166,7 @@ def hazard_curve(
     annual_rate: ArrayLike,
     *,
     source: str = "hazard curve",
-    **of: Unpack[_CurveSite],
+    **of: Any,
 ) -> HazardCurve:
     """Return a checked hazard curve; levels without a usable rate are omitted with a warning.
 
@@ -171,13 +178,14 @@ def hazard_curve(
         levels: levels in that unit, above zero, rising, shape (n,).
         annual_rate: rates of exceedance [1/a], not below zero, never rising, shape (n,).
         source: file and place, for messages.
-        of: period_s [s], site, lon and lat [deg], and statistic, as of :class:`HazardCurve`.
+        of: period_s [s], site, lon and lat [deg], statistic and component, as of
+            :class:`HazardCurve`.
 
     Raises:
         InputError: levels or rates that make no hazard curve, with the offending value.
     """
-    if measure not in MEASURES:
-        raise InputError(f"{source}: measure {measure!r} is not one of {', '.join(MEASURES)}")
+    if measure not in CURVE_MEASURES:
+        raise InputError(f"{source}: measure {measure!r} is not one of {', '.join(CURVE_MEASURES)}")
     period_s = of.get("period_s")
     if measure == "sa_g" and (period_s is None or not period_s > 0.0):
         raise InputError(f"{source}: a spectral acceleration requires a period above 0 s")
@@ -214,7 +222,10 @@ def hazard_curve(
     # a curve may go on to levels that nothing reaches, at rates that say so
     reached = x[rate > _SELDOM]
     name = SPECTRAL.get(period_s or 0.0, measure) if measure == "sa_g" else measure
-    doubts = (*doubts_about({name: reached}), *doubts_about_rates(rate))
+    doubts = [*doubts_about({name: reached})]
+    if (largest := rate[0]) > _MOST_A_YEAR:
+        text = f"the curve has a rate of {largest:.4g} /yr: are these annual rates of exceedance?"
+        doubts.append(Diagnostic(text, "suspicious_value"))
     warnings += [doubt.replaced(text=f"{source}: {doubt}") for doubt in doubts]
     return HazardCurve(measure, x, rate, end_level, source=source, warnings=tuple(warnings), **of)
 
@@ -242,3 +253,154 @@ def _reject_disorder(x: FloatArray, rate: FloatArray, measure: str, source: str)
                 f"{source}: the rate rises from {rate[i - 1]:g} to {rate[i]:g} 1/a at level "
                 f"{i + 1} ({measure} = {x[i]:g}): a higher level cannot be exceeded more often"
             )
+
+
+NOTABLE = 0.01
+"""Part of a rate, or probability, from which on a warning tells of it."""
+
+NOTABLE_FACTOR = 2.0
+"""Factor on a rate by shaking above the last level from which on the answer is a range."""
+
+
+def rate_bounds(
+    rate: FloatArray, above: FloatArray, above_at_most: FloatArray, below: FloatArray
+) -> FloatArray:
+    """Return upper bounds of rates [1/yr], shape (m,), of which `rate` are the lower ones.
+
+    Shaking above the last level of a curve fails a block each time at most. NaN where a block
+    fails below the first level, too: a curve gives no rate of weaker shaking.
+
+    Args:
+        rate: rates of failure [1/yr], shape (m,).
+        above: part from beyond the last level, at least [1/yr], shape (m,).
+        above_at_most: the same at most.
+        below: probability of failure at the first level, shape (m,).
+    """
+    return np.where(below > NOTABLE, np.nan, rate + above_at_most - above)
+
+
+def is_truncated(rate: FloatArray, bound: FloatArray) -> NDArray[np.bool_]:
+    """Return where a rate is a range because the curve ends or begins too early, shape (m,).
+
+    Args:
+        rate: rates of failure [1/yr], shape (m,); NaN for a block that cannot be used.
+        bound: their upper bounds, from :func:`rate_bounds`.
+    """
+    return (rate >= 0.0) & ~(bound <= np.maximum(NOTABLE_FACTOR * rate, NEVER))
+
+
+def describe_ends(
+    curves: Sequence[HazardCurve],
+    site: NDArray[np.intp],
+    rate: FloatArray,
+    above: FloatArray,
+    above_at_most: FloatArray,
+    below: FloatArray,
+) -> Iterator[str]:
+    """Yield warnings where shaking beyond the ends of curves may matter; the worst case is named.
+
+    Args:
+        curves: the curve of each site.
+        site: index of each block's site, shape (m,).
+        rate: rates of failure [1/a], shape (m,); NaN of blocks that cannot be used.
+        above: part from beyond the last level, at least [1/a], shape (m,).
+        above_at_most: the same at most.
+        below: probability of failure at the first level, shape (m,).
+    """
+    more = above_at_most - above
+    of_block = " of a block" if rate.size > 1 else ""
+    for doubtful, size in ((more > NOTABLE * rate, more), (below > NOTABLE, below)):
+        if not doubtful.any():
+            continue
+        worst = int(np.argmax(np.where(doubtful, size, -1.0)))
+        curve, sites = curves[site[worst]], np.unique(site[doubtful]).size
+        of_site = f" of {curve.place}" if len(curves) > 1 and curve.place else ""
+        more_sites = f" (and {sites - 1:,} more of {len(curves):,} sites)" if sites > 1 else ""
+        if size is more:
+            yield Diagnostic(
+                f"the hazard curve{of_site} ends at {curve.level_text(-1)}: stronger shaking may "
+                f"add up to {annual_rate(float(more[worst]))} /yr to the rate{of_block}"
+                f"{more_sites}",
+                "curve_ends",
+            )
+        else:
+            yield Diagnostic(
+                f"the hazard curve{of_site} begins at {curve.level_text(0)}, where "
+                f"P(failure){of_block} is already {percent(float(below[worst]))}: weaker shaking "
+                f"is neglected (unconservative){more_sites}",
+                "curve_ends",
+            )
+
+
+_SA = re.compile(r"SA\s*\(\s*([0-9.]+)\s*\)", re.IGNORECASE)
+
+
+@dataclass(frozen=True)
+class IntensityType:
+    """Intensity measure of the levels of a file.
+
+    Args:
+        measure: ``pga_g``, ``pgv_m_s`` or ``sa_g``.
+        factor: what a level of the file is multiplied by to be in that unit.
+        period_s: oscillator period of a spectral acceleration [s].
+    """
+
+    measure: str
+    factor: float
+    period_s: float | None = None
+
+    @classmethod
+    def of(cls, measure: str) -> IntensityType:
+        """Return the type of a measure, by its name in `predict`."""
+        period_s, factor = MEASURES[measure].period_s, MEASURES[measure].imt_factor
+        return cls(measure if period_s is None else "sa_g", factor, period_s)
+
+    @property
+    def imt(self) -> str:
+        """Name in OpenQuake."""
+        return f"SA({self.period_s})" if self.measure == "sa_g" else MEASURES[self.measure].imt
+
+
+def openquake_type(imt: str, where: str) -> IntensityType:
+    """Return the type of an OpenQuake intensity measure: PGA [g], PGV [cm/s], SA(T) [g]."""
+    name = imt.strip()
+    for measure, about in MEASURES.items():
+        if about.imt and about.imt == name.upper() and about.period_s is None:
+            return IntensityType.of(measure)
+    match = _SA.fullmatch(name)
+    if match:
+        try:
+            period = float(match.group(1))
+        except ValueError:
+            period = 0.0
+        if period > 0.0:
+            return IntensityType("sa_g", 1.0, period)
+    raise InputError(
+        f"{where}: intensity measure {imt!r} is unknown; use PGA [g], PGV [cm/s] or SA(period) [g]",
+        fields=("imt",),
+    )
+
+
+def requested_measure(imt: str, *, alone: bool = False) -> tuple[str, IntensityType]:
+    """Return the requested measure, by its name in `predict`, and its type.
+
+    Args:
+        alone: accept only what a model reads alone.
+    """
+    kind = openquake_type(imt, "imt")
+    name = kind.measure if kind.period_s is None else SPECTRAL.get(kind.period_s)
+    if name is None or (alone and name not in ALONE):
+        periods = (period for period in SPECTRAL if not alone or SPECTRAL[period] in ALONE)
+        options = ", ".join(["PGV", "PGA", *(f"SA({period:g})" for period in periods)])
+        text = f"imt = {imt}: no model uses it{' alone' if alone else ''}: use one of {options}"
+        raise InputError(text, fields=("imt",))
+    return name, kind
+
+
+def is_read(imt: str) -> bool:
+    """Return whether a model uses a measure, given by its OpenQuake name."""
+    try:
+        requested_measure(imt)
+    except InputError:
+        return False
+    return True

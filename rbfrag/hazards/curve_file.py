@@ -18,11 +18,12 @@ from rbfrag.hazards.curve import (
     ANSWERED,
     CurveKeywords,
     HazardCurve,
+    IntensityType,
     hazard_curve,
+    openquake_type,
     rates_from_probabilities,
 )
-from rbfrag.hazards.im_uncertainty import velocity_conversion
-from rbfrag.hazards.measure_type import IntensityType, openquake_type
+from rbfrag.hazards.shaking import velocity_conversion
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.question.components import COMPONENTS
 from rbfrag.results.diagnostic import Diagnostic
@@ -40,7 +41,7 @@ def as_curves(
         InputError: something else, or a file that holds curves of several sites.
     """
     if isinstance(sources, str | os.PathLike):
-        curves = suited_in(sources, **meaning)
+        curves = select_curves(sources, **meaning)
         if len(curves) > 1:
             raise InputError(
                 f"{sources} has {len(curves)} sites, and the blocks are at one site: choose it by "
@@ -57,7 +58,9 @@ def as_curves(
     return [curve for source in sources for curve in as_curves(source, **meaning)]
 
 
-def suited_in(path: str | os.PathLike[str], **meaning: Unpack[CurveKeywords]) -> list[HazardCurve]:
+def select_curves(
+    path: str | os.PathLike[str], **meaning: Unpack[CurveKeywords]
+) -> list[HazardCurve]:
     """Return the curves of a file that a model can use, one per site; see :func:`as_curves`."""
     convert = meaning.get("convert")
     period = None if convert is None else velocity_conversion(convert).period_s
@@ -113,36 +116,24 @@ def hazard_curves_in(
     else:
         curves = table_curves(text, source, imt)
     if imt is not None:
-        curves = _of_imt(curves, imt, source)
-    if site is not None:
-        curves = _of_site(curves, site, source)
-    return curves
-
-
-def _of_imt(curves: list[HazardCurve], imt: str, source: str) -> list[HazardCurve]:
-    kind = openquake_type(imt, "imt")
-    selected = [
-        curve
-        for curve in curves
-        if curve.measure == kind.measure and (kind.period_s is None or curve.is_of(kind.period_s))
-    ]
-    if not selected:
-        have = ", ".join(dict.fromkeys(curve.imt for curve in curves))
-        raise InputError(f"{source}: there is no curve of {imt}; there are {have}")
-    return selected
-
-
-def _of_site(curves: list[HazardCurve], site: str, source: str) -> list[HazardCurve]:
-    named = [curve for curve in curves if curve.site == site]
-    if named:
-        return named
+        kind, have = openquake_type(imt, "imt"), ", ".join(dict.fromkeys(c.imt for c in curves))
+        curves = [
+            curve
+            for curve in curves
+            if curve.measure == kind.measure
+            and (kind.period_s is None or curve.is_of(kind.period_s))
+        ]
+        if not curves:
+            raise InputError(f"{source}: there is no curve of {imt}; there are {have}")
+    if site is None or (named := [curve for curve in curves if curve.site == site]):
+        return curves if site is None else named
     sites = list(dict.fromkeys((curve.site, curve.lon, curve.lat) for curve in curves))
-    if site.isdigit() and 1 <= int(site) <= len(sites):
-        place = sites[int(site) - 1]
-        return [curve for curve in curves if (curve.site, curve.lon, curve.lat) == place]
-    raise InputError(
-        f"{source}: there is no site {site!r}; give a number from 1 to {len(sites)}, or a name"
-    )
+    if not (site.isdigit() and 1 <= int(site) <= len(sites)):
+        raise InputError(
+            f"{source}: there is no site {site!r}; give a number from 1 to {len(sites)}, or a name"
+        )
+    place = sites[int(site) - 1]
+    return [curve for curve in curves if (curve.site, curve.lon, curve.lat) == place]
 
 
 def suited_curves(
@@ -204,7 +195,17 @@ def nshm_curves(text: str, source: str) -> list[HazardCurve]:
             raise InputError(
                 f"{source}: no hazard curves as the USGS services answer; download the curve again"
             ) from None
-    return [_curve(name, member, f"{source}, {name!r}") for name, member in document.items()]
+    curves = []
+    for name, member in document.items():
+        where = f"{source}, {name!r}"
+        kind = _usgs_type(name, where)
+        if not isinstance(member, dict):
+            raise InputError(f"{where}: an object with xs and ys is required")
+        x, y = (_numbers(member.get(key), key, where) for key in ("xs", "ys"))
+        with np.errstate(over="ignore"):
+            levels = kind.factor * np.exp(x)
+        curves.append(hazard_curve(kind.measure, levels, y, source=where, period_s=kind.period_s))
+    return curves
 
 
 def _service_curves(document: dict[str, Any], source: str) -> Iterator[HazardCurve]:
@@ -233,16 +234,6 @@ def _service_curves(document: dict[str, Any], source: str) -> Iterator[HazardCur
             )  # fmt: skip
 
 
-def _curve(name: str, member: Any, where: str) -> HazardCurve:
-    kind = _usgs_type(name, where)
-    if not isinstance(member, dict):
-        raise InputError(f"{where}: an object with xs and ys is required")
-    x, y = (_numbers(member.get(key), key, where) for key in ("xs", "ys"))
-    with np.errstate(over="ignore"):
-        levels = kind.factor * np.exp(x)
-    return hazard_curve(kind.measure, levels, y, source=where, period_s=kind.period_s)
-
-
 def _usgs_type(name: str, where: str) -> IntensityType:
     """Return the type of a USGS measure such as 1.00 Second Spectral Acceleration or SA1P0."""
     peaks = {"peak ground acceleration": "PGA", "peak ground velocity": "PGV"}
@@ -265,7 +256,7 @@ _NO_CURVES = {
     r"[0-9.e-]+~.+": "uniform hazard spectra",
     r"[A-Z].*-[0-9.]+(e-[0-9]+)?": "a hazard map",
 }
-"""Columns of what the engine exports beside curves: PROBABILITY~IMT and IMT-PROBABILITY."""
+"""Columns of what the engine exports in addition to curves: PROBABILITY~IMT and IMT-PROBABILITY."""
 
 _SITE_COLUMNS = ("lon", "lat", "depth", "custom_site_id", "site_id")
 
@@ -284,8 +275,14 @@ def openquake_curves(text: str, source: str) -> list[HazardCurve]:
     # λ = -ln(1 - poe)/time.
     rows = [cells for _, cells in csv_rows(text, source)]
     head = ",".join(rows[0])
-    if len(rows) > 1:
-        _reject_maps([name.strip() for name in rows[1]], source)
+    names = [name.strip() for name in rows[1]] if len(rows) > 1 else []
+    for name in () if any(map(_LEVEL.fullmatch, names)) else names:
+        for pattern, data in _NO_CURVES.items():
+            if re.fullmatch(pattern, name):
+                raise InputError(
+                    f"{source}, line 2: {name!r} is a column of {data}: single levels make no "
+                    "rate; export the curves of that job instead:  oq export hcurves CALC_ID -e csv"
+                )
     years = number_at(_header_value("investigation_time", head, source), f"{source}, line 1")
     if not years > 0.0:
         raise InputError(f"{source}, line 1: investigation_time = {years:g}: give years above zero")
@@ -293,7 +290,6 @@ def openquake_curves(text: str, source: str) -> list[HazardCurve]:
     statistic, component = _header_value("kind", head, source, ""), _component_in(text)
     if len(rows) < 2:
         raise InputError(f"{source}: ends after line 1, before the names of the columns")
-    names = [name.strip() for name in rows[1]]
     levels, columns = [], []
     for column, name in enumerate(names):
         match = _LEVEL.fullmatch(name)
@@ -323,34 +319,14 @@ def openquake_curves(text: str, source: str) -> list[HazardCurve]:
         cell_of = {name: row[i].strip() for i, name in enumerate(names)}
         with np.errstate(divide="ignore", over="ignore"):
             rates = rates_from_probabilities(poe, years)
-        curves.append(
-            hazard_curve(
-                kind.measure,
-                levels,
-                rates,
-                source=where,
-                period_s=kind.period_s,
-                statistic=statistic,
-                component=component,
-                **_site_of(cell_of, where),
-            )
-        )
+        curve = hazard_curve(
+            kind.measure, levels, rates, source=where, period_s=kind.period_s, statistic=statistic,
+            component=component, **_site_of(cell_of, where),
+        )  # fmt: skip
+        curves.append(curve)
     if not curves:
         raise InputError(f"{source}: there is no site below line 2")
     return curves
-
-
-def _reject_maps(names: Sequence[str], source: str) -> None:
-    """Reject hazard maps and uniform hazard spectra, which have one level of each measure."""
-    if any(_LEVEL.fullmatch(name) for name in names):
-        return
-    for pattern, data in _NO_CURVES.items():
-        column = next((name for name in names if re.fullmatch(pattern, name)), None)
-        if column is not None:
-            raise InputError(
-                f"{source}, line 2: {column!r} is a column of {data}: single levels make no rate; "
-                "export the curves of that job instead:  oq export hcurves CALC_ID -e csv"
-            )
 
 
 def _header_value(name: str, head: str, source: str, default: str | None = None) -> str:
@@ -365,17 +341,14 @@ def _header_value(name: str, head: str, source: str, default: str | None = None)
 def _site_of(cells: dict[str, str], where: str) -> dict[str, Any]:
     """Return the name and coordinates of the site of a row."""
     named = (cells[name] for name in ("custom_site_id", "site_id", "name", "site") if name in cells)
-    lon, lat = (_coordinate(cells, *axis, where) for axis in (("lon", 180.0), ("lat", 90.0)))
-    return {"site": next(named, ""), "lon": lon, "lat": lat}
-
-
-def _coordinate(cells: dict[str, str], name: str, limit: float, where: str) -> float | None:
-    if name not in cells:
-        return None
-    value = number_at(cells[name], where)
-    if not abs(value) <= limit:
-        raise InputError(f"{where}: {name} = {value:g} must be between -{limit:g} and {limit:g}")
-    return value
+    place: dict[str, float | None] = {}
+    for name, limit in (("lon", 180.0), ("lat", 90.0)):
+        value = place[name] = number_at(cells[name], where) if name in cells else None
+        if value is not None and not abs(value) <= limit:
+            raise InputError(
+                f"{where}: {name} = {value:g} must be between -{limit:g} and {limit:g}"
+            )
+    return {"site": next(named, ""), **place}
 
 
 _LEVELS = {
@@ -428,9 +401,22 @@ def table_curves(text: str, source: str, imt: str | None = None) -> list[HazardC
         return list(_site_rows(rows, source, imt))
     if len(header) != 2:
         raise InputError(f"{source}, line {line}: {len(header)} columns, not two: {HEADER_HELP}")
-    measure, factor, period = _levels(_with_unit(header[0]), f"{source}, line {line}", imt)
-    of_periods = _with_unit(header[1]) in _RETURN_PERIODS
-    years = None if of_periods else _years(_with_unit(header[1]), f"{source}, line {line}")
+    where, (level, rate) = f"{source}, line {line}", map(_with_unit, header)
+    period = None
+    if level == "ground_motion_g":
+        kind = _type_from_option(imt, f"{where}: ground motion")
+        measure, factor, period = kind.measure, 1.0, kind.period_s
+    elif match := _SPECTRAL_COLUMN.fullmatch(level):
+        measure, factor, period = "sa_g", 1.0, float(match[1])
+    elif level in _LEVELS:
+        measure, factor = _LEVELS[level]
+    else:
+        raise InputError(f"{where}: column {level!r} is unknown: {HEADER_HELP}")
+    match, of_periods = _POE.fullmatch(rate), rate in _RETURN_PERIODS
+    years = float(match[1]) if match else None
+    is_rate = of_periods or re.fullmatch("annual_rate|annual_frequency_of_exceed[ae]nce", rate)
+    if not (is_rate or (years is not None and years > 0.0)):
+        raise InputError(f"{where}: column {rate!r} must be a rate or a probability: {HEADER_HELP}")
     levels, values = [], []
     for number, row in rows[1:]:
         if len(row) != 2:
@@ -523,24 +509,3 @@ def _with_unit(name: str) -> str:
         return text.replace(" ", "_")
     spelled = unit[1].strip().replace("/", "_").replace("²", "2").replace("^", "")
     return f"{text[: unit.start()].strip()}_{spelled}".replace(" ", "_")
-
-
-def _levels(name: str, where: str, imt: str | None) -> tuple[str, float, float | None]:
-    if name == "ground_motion_g":
-        kind = _type_from_option(imt, f"{where}: ground motion")
-        return kind.measure, 1.0, kind.period_s
-    if name in _LEVELS:
-        return *_LEVELS[name], None
-    match = _SPECTRAL_COLUMN.fullmatch(name)
-    if match:
-        return "sa_g", 1.0, float(match.group(1))
-    raise InputError(f"{where}: column {name!r} is unknown: {HEADER_HELP}")
-
-
-def _years(name: str, where: str) -> float | None:
-    if name == "annual_rate" or re.fullmatch("annual_frequency_of_exceed[ae]nce", name):
-        return None
-    match = _POE.fullmatch(name)
-    if match and float(match.group(1)) > 0.0:
-        return float(match.group(1))
-    raise InputError(f"{where}: column {name!r} must be a rate or a probability: " + HEADER_HELP)

@@ -13,9 +13,8 @@ import numpy as np
 from rbfrag.errors import InputError
 from rbfrag.files import csv_rows, number_at, source_text
 from rbfrag.hazards.curve import CurveKeywords, HazardCurve
-from rbfrag.hazards.im_uncertainty import component_of_velocity, velocity_of
 from rbfrag.hazards.rate_density import STEP, Grid, smoothing_of, under
-from rbfrag.hazards.shaking import HazardLevel, component_of
+from rbfrag.hazards.shaking import HazardLevel, component_of, component_of_velocity, velocity_of
 from rbfrag.question.components import SINGLE_COMPONENT, component_named
 from rbfrag.results.diagnostic import Diagnostic
 from rbfrag.results.numbers import annual_rate
@@ -118,7 +117,7 @@ class Disaggregation:
         """Return the curve of single-component PGV that corresponds to a curve of PGA.
 
         The rate λ s_M of each magnitude falls with the PGA; the mass that it loses at a PGA goes to
-        the PGV of the law (:func:`rbfrag.hazards.im_uncertainty.velocity_of`), with its scatter.
+        the PGV of the law (:func:`rbfrag.hazards.shaking.velocity_of`), with its scatter.
         PGA beyond the last level of its curve counts as that level.
 
         Args:

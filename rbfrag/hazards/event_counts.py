@@ -16,25 +16,27 @@ from numpy.typing import NDArray
 from scipy.special import ndtr, ndtri
 
 from rbfrag.fragility.joint import SIDES, Indices, IntArray
-from rbfrag.fragility.joint_sampling import JointSampler
-from rbfrag.fragility.large_counts import LargeCounts, LatentEvent
+from rbfrag.fragility.joint_sampling import JointSampler, LargeCounts, LatentEvent
 from rbfrag.fragility.uncertain import normal_steps
 from rbfrag.hazards.event_means import shifts_on
 from rbfrag.hazards.event_set import EventSet
+from rbfrag.hazards.joint_rate import COPULA, DEPENDENT, INDEPENDENT
 from rbfrag.hazards.portfolio import Portfolio
 from rbfrag.hazards.rate_density import Grid, smoothing_of
 from rbfrag.hazards.shaking import HazardLevel
-from rbfrag.hazards.standing_blocks import COPULA, DEPENDENT, INDEPENDENT
 from rbfrag.solver.results import FloatArray
 
-PAIRS_AT_ONCE, SAMPLES_AT_ONCE = 1 << 16, 1 << 22
-"""Blocks times rows of shaking, and samples of all events, of one part of the work."""
+PAIRS_AT_ONCE, SAMPLES_AT_ONCE = 1 << 19, 1 << 22
+"""Blocks times rows of shaking, and samples of all events, of one part of the work: some 200 MB."""
+
+_MOST_KEPT = 1 << 24
+"""Shifts on the nodes of all sites up to which they are kept for the next parts: 130 MB."""
 
 NOTHING = 1e-12
 """Smaller probabilities are zero."""
 
 LARGE, ENOUGH_SITES = 1000, 30
-"""Unlike blocks beyond which, at so many sites or more, only their number is drawn."""
+"""Numbers of distinct blocks and of sites above which only the count of failures is sampled."""
 
 _VALUES_AT_ONCE = 1 << 19
 _OF_EVENTS, _OF_BLOCKS = 0, 1
@@ -60,8 +62,11 @@ class EventYears(NamedTuple):
         counts: numbers of failures that curves are given for, rising.
         losses: losses that curves are given for, rising.
         samples: samples of each event; 0 for expected values alone.
+        range_u: range of ln(level) over all events; None for that of these events.
         shifted: the portfolio by models of other parameters, which answer by the same samples; as
             many as two of each principal axis of the models' errors are taken for these.
+        cached_shifts: shifts on the nodes of each site that a part has used, for the next ones;
+            None without a cache.
     """
 
     number: int
@@ -72,18 +77,12 @@ class EventYears(NamedTuple):
     samples: int
     seed: int
     shifted: tuple[Portfolio, ...] = ()
+    range_u: tuple[float, float] | None = None
+    cached_shifts: dict[int, FloatArray] | None = None
 
 
-class EventBatch(NamedTuple):
-    """Complete years of an event set, sent to a worker without the data that all parts share.
-
-    Args:
-        number: place of the part in the order of all.
-        events: the events.
-    """
-
-    number: int
-    events: EventSet
+EventBatch = tuple[int, EventSet]
+"""Number and events of a part, as sent to a worker without the data that all parts share."""
 
 
 class Curves(NamedTuple):
@@ -178,7 +177,8 @@ def count_years(common: EventYears, batch: EventBatch) -> PartCounts:
         common: the portfolio and what is asked, of no events.
         batch: the events.
     """
-    return count_part(common._replace(number=batch.number, events=batch.events))
+    number, events = batch
+    return count_part(common._replace(number=number, events=events))
 
 
 def count_part(part: EventYears) -> PartCounts:
@@ -196,8 +196,13 @@ def count_part(part: EventYears) -> PartCounts:
     for event, shaken in _shaken(part):
         indices, p = shaken.block, shaken.probability
         failures[event] = p @ (portfolio.weight[indices] * number[indices])
+        # P of any failure under full dependence and independence
         counted = portfolio.weight[indices] > 0.0
-        bounds[:, event] = _bounds(p[counted], number[indices][counted])
+        p_counted, many = p[counted], number[indices][counted]
+        bounds[:, event] = p_counted.sum()
+        if many.sum() > 1:
+            none = many @ np.log1p(-np.minimum(p_counted, 1.0 - 1e-16))
+            bounds[:, event] = p_counted.max(initial=0.0), -np.expm1(none)
         mean = events.weight[event] * p
         blocks[0, indices] += mean
         blocks[1, indices] += mean * mean
@@ -230,12 +235,9 @@ def count_part(part: EventYears) -> PartCounts:
     )  # fmt: skip
 
 
-def _bounds(p: FloatArray, count: IntArray) -> tuple[float, float]:
-    """Return P of any failure under full dependence and independence."""
-    if count.sum() < 2:
-        return float(p.sum()), float(p.sum())
-    none = count @ np.log1p(-np.minimum(p, 1.0 - 1e-16))
-    return float(p.max(initial=0.0)), float(-np.expm1(none))
+def log_shaking(events: EventSet, portfolio: Portfolio) -> FloatArray:
+    """Return ln(level) of the first measure of the models for each row of an event set."""
+    return np.asarray(np.log(np.maximum(events.measures[portfolio.measures[0]], _LEAST_SHAKING)))
 
 
 def _shaken(part: EventYears) -> Iterator[tuple[int, TriggeredBlocks]]:
@@ -253,12 +255,19 @@ def _shaken(part: EventYears) -> Iterator[tuple[int, TriggeredBlocks]]:
         about = HazardLevel.about(portfolio.measures[0], portfolio.component)
         step, smoothing = smoothing_of(about)
         step = step if smoothing.reach else _SHIFT_STEP
-        u = np.log(np.maximum(events.measures[portfolio.measures[0]], _LEAST_SHAKING))
-        grid = Grid.over(step, float(u.min()), float(u.max()), smoothing.reach)
-    for site in np.intersect1d(events.site, portfolio.site):
+        u = log_shaking(events, portfolio)
+        low, high = part.range_u or (float(u.min()), float(u.max()))
+        grid = Grid.over(step, low, high, smoothing.reach)
+        few = len(part.shifted) * portfolio.size * grid.size <= _MOST_KEPT
+    cached = {} if part.cached_shifts is None else part.cached_shifts
+    for site in np.intersect1d(events.site, portfolio.site).tolist():
         indices = np.flatnonzero(portfolio.site == site)
         if one_measure:
-            shifts = shifts_on(portfolio, indices, about, grid, smoothing)
+            shifts = cached.get(site)
+            if shifts is None:
+                shifts = shifts_on(portfolio, indices, about, grid, smoothing)
+            if few:
+                cached[site] = shifts
         rows = np.flatnonzero(events.site == site)
         at_once = max(1, _VALUES_AT_ONCE // (indices.size * weight.size))
         for start in range(0, rows.size, at_once):
@@ -275,7 +284,13 @@ def _shaken(part: EventYears) -> Iterator[tuple[int, TriggeredBlocks]]:
                 np.einsum("rkm,k->rm", other.probability(indices, shaking, points)[0], weight)
                 for other in (() if shifts is not None else part.shifted)
             )
-            square = _variance_of_score(at_points, weight) if part.shifted else 0.0 * p
+            square = 0.0 * p
+            if part.shifted and weight.size > 1:  # the variance of Φ⁻¹(P) over its points
+                score = np.clip(ndtri(at_points), -_REACH, _REACH)
+                mean, of_square = (
+                    np.einsum("rkm,k->rm", values, weight) for values in (score, score * score)
+                )
+                square = np.maximum(of_square - mean * mean, 0.0)
             columns = [values[which, block] for values in (p, outside, square, *shifted)]
             if shifts is not None:
                 first, weights = grid.cubic(u[chunk][which])
@@ -303,15 +318,6 @@ def _shaken(part: EventYears) -> Iterator[tuple[int, TriggeredBlocks]]:
                 block[span], row[span], p[span], outside[span], square[span], shift[:, span]
             ),
         )
-
-
-def _variance_of_score(p: FloatArray, weight: FloatArray) -> FloatArray:
-    """Return the variance of Φ⁻¹(P) over its quadrature points, rows x points x m."""
-    if weight.size < 2:
-        return np.zeros((p.shape[0], p.shape[2]))
-    score = np.clip(ndtri(p), -_REACH, _REACH)
-    mean, square = (np.einsum("rkm,k->rm", values, weight) for values in (score, score * score))
-    return np.asarray(np.maximum(square - mean * mean, 0.0))
 
 
 def _sampler(portfolio: Portfolio, indices: Indices) -> JointSampler | LargeCounts | None:
@@ -356,21 +362,15 @@ def _sampled(
         k = span.stop - start
         sample_bounds = bounds(k)
         for number, law in enumerate(laws):
-            sides = _sides(law, sampler, (k, indices.size), generator)
+            if sampler is not None:  # Z on each side that blocks may face, sides x draws x m
+                sides = sampler.sides(k, generator)
+            else:
+                z = generator.standard_normal((1, k, 1 if law == DEPENDENT else indices.size))
+                sides = np.broadcast_to(z, (1, k, indices.size))
             result[:, number, :, span] = _failing(
                 portfolio, shaken, sides, sample_bounds, generator, alone=law == INDEPENDENT
             )
     return result.reshape(-1, 2, draws), (result[0, :, 0] > 0.0).mean(axis=1)
-
-
-def _sides(
-    law: str, sampler: JointSampler | None, shape: tuple[int, int], generator: np.random.Generator
-) -> FloatArray:
-    """Return Z on each side that blocks may face, sides x draws x m."""
-    if sampler is not None:
-        return sampler.sides(shape[0], generator)
-    columns = 1 if law == DEPENDENT else shape[1]
-    return np.broadcast_to(generator.standard_normal((1, shape[0], columns)), (1, *shape))
 
 
 class _Bounds(NamedTuple):
@@ -546,19 +546,6 @@ def _sum_by_moments(
     return number * mean + scale * (generator.standard_gamma(shape) - shape)
 
 
-def _common(part: EventYears, shaken: TriggeredBlocks) -> float:
-    """Return the fraction of the variance of failure scores that is due to the component."""
-    portfolio, indices = part.portfolio, shaken.block
-    if not portfolio.component.sigma > 0.0:
-        return 0.0
-    shaking = {name: part.events.measures[name][shaken.row] for name in portfolio.measures}
-    ends = (portfolio.probability(indices, shaking, (xi, 0.0, 0.0))[0] for xi in (1.0, -1.0))
-    high, low = (np.clip(ndtri(p), -_REACH, _REACH) for p in ends)
-    square, p = 0.25 * (high - low) ** 2, shaken.probability
-    weight = portfolio.count[indices] * p * (1.0 - p) + NOTHING
-    return float(np.average(square / (1.0 + square), weights=weight))
-
-
 def _of_many(
     part: EventYears,
     shaken: TriggeredBlocks,
@@ -574,8 +561,16 @@ def _of_many(
         square = mean_loss**2 * np.exp(portfolio.loss_sigma[indices] ** 2)
     weight = portfolio.weight[indices]
     marks = ((weight, weight**2), (mean_loss, square))
-    bound = ndtri(shaken.probability) + shift
-    return sampler.sums(bound, _common(part, shaken), latent, marks)
+    # the fraction of the variance of failure scores that is due to the component
+    common, p = 0.0, shaken.probability
+    if portfolio.component.sigma > 0.0:
+        shaking = {name: part.events.measures[name][shaken.row] for name in portfolio.measures}
+        ends = (portfolio.probability(indices, shaking, (xi, 0.0, 0.0))[0] for xi in (1.0, -1.0))
+        high, low = (np.clip(ndtri(end), -_REACH, _REACH) for end in ends)
+        variance = 0.25 * (high - low) ** 2
+        of_each = portfolio.count[indices] * p * (1.0 - p) + NOTHING
+        common = float(np.average(variance / (1.0 + variance), weights=of_each))
+    return sampler.sums(ndtri(p) + shift, common, latent, marks)
 
 
 def _curves(events: EventSet, drawn: FloatArray, ends: FloatArray, laws: int) -> Curves:

@@ -8,7 +8,7 @@ earthquake is visited. The rate of a block is its P against the mass of the site
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.special import ndtri
@@ -17,10 +17,10 @@ from rbfrag.db.model_file import ModelRow
 from rbfrag.fragility.confidence import ParameterErrors
 from rbfrag.hazards.event_set import EventSet, IntArray
 from rbfrag.hazards.portfolio import Portfolio
-from rbfrag.hazards.rate_density import Grid, Indices, Smoothing, cubic_at, event_mass
+from rbfrag.hazards.rate_density import Grid, Indices, SiteMass, Smoothing, smoothing_of
 from rbfrag.hazards.rate_integration import KernelBlocks, half_width, sums_of, table_of
 from rbfrag.hazards.shaking import HazardLevel
-from rbfrag.solver.integrator.compiled import kernel
+from rbfrag.solver.integrator.compiled import inner_kernel, kernel
 from rbfrag.solver.results import FloatArray
 
 _BLOCKS_AT_ONCE = 256
@@ -75,7 +75,7 @@ def event_means(events: EventSet, portfolio: Portfolio, level: float) -> EventMe
     number = portfolio.count * portfolio.weight
     cost = np.zeros(portfolio.size) if portfolio.mean_loss is None else portfolio.mean_loss
     cost = portfolio.count * cost
-    totals: dict[str, tuple[ParameterErrors, FloatArray]] = {}
+    totals: dict[str, tuple[ParameterErrors, Any]] = {}
     for first, last in _groups(site, sites.size):
         tables = np.zeros((4, last - first, mass.grid.size))
         for indices, group in _blocks_of(portfolio, np.flatnonzero((site >= first) & (site < last)),
@@ -87,7 +87,7 @@ def event_means(events: EventSet, portfolio: Portfolio, level: float) -> EventMe
             blocks[0, indices], blocks[2, indices] = rate, outside
             blocks[1, indices] = np.einsum("mn,mn->m", p * p, squared[group.site])
             half[indices] = half_width(group.model.errors, np.stack(gradient), level)
-            before = totals.get(group.model.name, (None, np.zeros((2, len(gradient)))))[1]
+            _, before = totals.get(group.model.name, (None, 0.0))
             by = np.stack([number[indices], cost[indices]])
             totals[group.model.name] = group.model.errors, before + by @ np.stack(gradient).T
             site_index = group.site - first
@@ -111,6 +111,80 @@ def event_means(events: EventSet, portfolio: Portfolio, level: float) -> EventMe
     return EventMeans(
         failures, loss, bounds, blocks, half, float(total_half[0]), float(total_half[1])
     )  # fmt: skip
+
+
+def event_mass(
+    events: EventSet, name: str, sites: Indices, shaking: HazardLevel
+) -> tuple[SiteMass, FloatArray, FloatArray]:
+    """Return the rate density of an event set at sites, and u of each row.
+
+    Args:
+        name: the measure.
+        sites: indices of the sites, rising.
+
+    Returns:
+        The mass; one of squared weights without scatter, sites x nodes; and ln(level) of the rows,
+        -inf where nothing shook.
+    """
+    step, smoothing = smoothing_of(shaking)
+    with np.errstate(divide="ignore"):
+        u = np.log(events.measures[name])
+    place = np.full(len(events.site_ids), -1)
+    place[sites] = np.arange(sites.size)
+    seen = np.isfinite(u) & (place[events.site] >= 0)
+    ends = (u[seen].min(), u[seen].max()) if seen.any() else (0.0, 0.0)
+    grid = Grid.over(step, float(ends[0]), float(ends[1]), smoothing.reach)
+    masses = np.zeros((2, sites.size, grid.size))
+    add_mass(masses, place, events.site, events.event, events.weight, u, *grid)
+    site_mass = smoothing.of(masses[0])
+    empty = np.empty((0, *site_mass.shape))
+    return SiteMass(grid, site_mass, empty, np.ones(1), smoothing), masses[1], u
+
+
+@kernel
+def add_mass(
+    mass: FloatArray,
+    place: Indices,
+    site: IntArray,
+    event: IntArray,
+    weight: FloatArray,
+    u: FloatArray,
+    step: float,
+    first: int,
+    size: int,
+) -> None:
+    """Add the weights of events, and their squares, to the nodes near the shaking of each row.
+
+    Args:
+        mass: what is added to, 2 x sites x nodes.
+        place: index among these sites of each site, -1 for one that is left out.
+        site: site of each row.
+        event: event of each row.
+        weight: of each event.
+        u: ln(level) of each row; what is not finite is left out.
+        step: of the grid, as are `first` and `size`.
+    """
+    for row in range(u.size):
+        site_row = place[site[row]]
+        if site_row < 0 or not np.isfinite(u[row]):
+            continue
+        start, a, b, c, d = cubic_at(u[row], step, first, size)
+        w = weight[event[row]]
+        for node, part in ((0, a), (1, b), (2, c), (3, d)):
+            mass[0, site_row, start + node] += part * w
+            mass[1, site_row, start + node] += part * w * w
+
+
+@inner_kernel
+def cubic_at(
+    u: float, step: float, first: int, size: int
+) -> tuple[int, float, float, float, float]:
+    """Return the first of four nodes about u and their weights; see :meth:`Grid.cubic`."""
+    x = u / step - first
+    start = min(max(int(np.floor(x)) - 1, 0), size - 4)
+    a = min(max(x, 0.0), size - 1.0) - start
+    b, c, d = a - 1.0, a - 2.0, a - 3.0
+    return start, -b * c * d / 6.0, a * c * d / 2.0, -a * b * d / 2.0, a * b * c / 6.0
 
 
 def axes_of(row: ModelRow) -> FloatArray:

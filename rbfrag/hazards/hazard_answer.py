@@ -12,11 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbfrag.fragility import describe
-from rbfrag.hazards import im_uncertainty
-from rbfrag.hazards.curve import HazardCurve
+from rbfrag.hazards.curve import NOTABLE_FACTOR, HazardCurve, is_truncated, rate_bounds
 from rbfrag.hazards.joint_rate import JointRate
 from rbfrag.hazards.rate_density import Indices
-from rbfrag.hazards.shaking import NOTABLE
+from rbfrag.hazards.shaking import between_measures, between_measures_text
 from rbfrag.results.numbers import (
     NEVER,
     SMALLEST,
@@ -42,38 +41,8 @@ ROWS_SHOWN = 20
 SHORTEST_SHOWN = 3
 """Blocks that are named by their return periods."""
 
-NOTABLE_FACTOR = 2.0
-"""Factor on a rate by shaking above the last level from which on the answer is a range."""
-
 SMALLEST_FRACTION = 5e-4
 """Contributions below this fraction of a rate are not printed."""
-
-
-def rate_bounds(
-    rate: FloatArray, above: FloatArray, above_at_most: FloatArray, below: FloatArray
-) -> FloatArray:
-    """Return upper bounds of rates [1/yr], shape (m,), of which `rate` are the lower ones.
-
-    Shaking above the last level of a curve fails a block each time at most. NaN where a block
-    fails below the first level, too: a curve gives no rate of weaker shaking.
-
-    Args:
-        rate: rates of failure [1/yr], shape (m,).
-        above: part from beyond the last level, at least [1/yr], shape (m,).
-        above_at_most: the same at most.
-        below: probability of failure at the first level, shape (m,).
-    """
-    return np.where(below > NOTABLE, np.nan, rate + above_at_most - above)
-
-
-def is_truncated(rate: FloatArray, bound: FloatArray) -> NDArray[np.bool_]:
-    """Return where a rate is a range because the curve ends or begins too early, shape (m,).
-
-    Args:
-        rate: rates of failure [1/yr], shape (m,); NaN for a block that cannot be used.
-        bound: their upper bounds, from :func:`rate_bounds`.
-    """
-    return (rate >= 0.0) & ~(bound <= np.maximum(NOTABLE_FACTOR * rate, NEVER))
 
 
 @dataclass(frozen=True, eq=False)
@@ -233,14 +202,6 @@ class HazardAnswer(Result):
         """True where the rate is a range because the curve ends or begins too early, shape (m,)."""
         return is_truncated(self.annual_rate, self.upper_bound)
 
-    @property
-    def _has_interval(self) -> bool:
-        """True if the sentences print the confidence interval of the rate."""
-        if self._is_single:
-            return not self._is_truncated[0] and float(self.ci_high[0]) > NEVER
-        bound = self.expected_failures_upper_bound
-        return bound is not None and bound <= NOTABLE_FACTOR * self.expected_failures_per_year
-
     def return_period_text(self, index: int) -> str:
         """Return the return period of a block, "840 years", or its range if the curve is too short.
 
@@ -294,8 +255,14 @@ class HazardAnswer(Result):
     def sentences(self) -> Iterator[str]:
         """Yield the return period of one block, or the expected failures of several."""
         yield from self._of_one_block() if self._is_single else self._of_all_blocks()
-        if self.tau is not None and self._has_interval:
-            yield im_uncertainty.in_words(self.tau)
+        bound = self.expected_failures_upper_bound
+        has_interval = (
+            not self._is_truncated[0] and float(self.ci_high[0]) > NEVER
+            if self._is_single
+            else bound is not None and bound <= NOTABLE_FACTOR * self.expected_failures_per_year
+        )
+        if self.tau is not None and has_interval:
+            yield between_measures_text(self.tau)
 
     def _of_one_block(self) -> Iterator[str]:
         rate, bound, low, high, chance = (
@@ -483,16 +450,33 @@ class HazardAnswer(Result):
             "method": self.method,
             "imt": self.curves[0].imt,
             "curve_kind": self.curve_kind,
-            "between_measures": im_uncertainty.as_dict(self.tau),
+            "between_measures": between_measures(self.tau),
         }
         if self.branches:
             shared["branches"] = [branch.as_dict() for branch in self.branches]
         warnings = list(self.warnings)
         if not self._is_single:
+            # the joint rates of each site and the sums over all blocks
+            common: dict[str, Any] = {"annual_rate_any": self.annual_rate_any}
+            if len(sites) == 1:
+                joint = {} if self.joint is None else self.joint.as_dict()
+                common = {"site": sites[0], **common, **joint}
+            elif any(self.joints):
+                common["sites"] = [
+                    {"site": site, **of_site.as_dict()}
+                    for site, of_site in zip(sites, self.joints, strict=True)
+                    if of_site is not None
+                ]
             return {
-                **self._in_common(sites), **shared, "blocks": self._with_rejected(rows),
+                **common,
+                "expected_failures_per_year": self.expected_failures_per_year,
+                "expected_failures_upper_bound": self.expected_failures_upper_bound,
+                "expected_failures_low": self.total_low,
+                "expected_failures_high": self.total_high,
+                **shared,
+                "blocks": self._with_rejected(rows),
                 "warnings": warnings,
-            }  # fmt: skip
+            }
         del rows[0]["block_id"]
         contributions = [
             {"from": low, "to": high, "annual_rate": part}
@@ -520,24 +504,3 @@ class HazardAnswer(Result):
         indices = range(max(len(rows) + len(rejected), *rejected, 0) + 1)
         merged = (rejected[i] if i in rejected else next(answered, None) for i in indices)
         return [row for row in merged if row is not None]
-
-    def _in_common(self, sites: list[str | None]) -> dict[str, Any]:
-        """Return the joint rates of each site and the sums over all blocks."""
-        common: dict[str, Any] = {"annual_rate_any": self.annual_rate_any}
-        if len(sites) == 1:
-            common = {"site": sites[0], **common}
-            if self.joint is not None:
-                common |= self.joint.as_dict()
-        elif any(self.joints):
-            common["sites"] = [
-                {"site": site, **joint.as_dict()}
-                for site, joint in zip(sites, self.joints, strict=True)
-                if joint is not None
-            ]
-        return {
-            **common,
-            "expected_failures_per_year": self.expected_failures_per_year,
-            "expected_failures_upper_bound": self.expected_failures_upper_bound,
-            "expected_failures_low": self.total_low,
-            "expected_failures_high": self.total_high,
-        }

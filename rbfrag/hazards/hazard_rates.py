@@ -12,31 +12,36 @@ from numpy.typing import ArrayLike
 
 from rbfrag.errors import InputError
 from rbfrag.fragility.confidence import quantiles_of
-from rbfrag.fragility.invalid_rows import (
+from rbfrag.fragility.model_selection import stored_rows
+from rbfrag.fragility.validation import (
     FROM_MEAN,
     FROM_SUMS,
     describe_invalid,
     elements,
     reject_elements,
 )
-from rbfrag.fragility.model_selection import stored_rows
-from rbfrag.hazards import im_uncertainty
-from rbfrag.hazards.annual_rate import checked_years, probability_in
 from rbfrag.hazards.branches import (
     Weights,
     branch_curves,
     curve_name,
+    curve_warnings,
     mixture_quantiles,
-    quantile_warning,
     weighted_quantiles,
 )
-from rbfrag.hazards.curve import CurveKeywords, HazardCurve
+from rbfrag.hazards.curve import (
+    NOTABLE,
+    CurveKeywords,
+    HazardCurve,
+    checked_years,
+    describe_ends,
+    is_truncated,
+    probability_in,
+    rate_bounds,
+)
 from rbfrag.hazards.curve_file import CurveLike
-from rbfrag.hazards.group_by_model import RateKeywords, parts_by_model
-from rbfrag.hazards.hazard_answer import BranchRate, HazardAnswer, is_truncated, rate_bounds
-from rbfrag.hazards.im_uncertainty import LAW_TAU, TAU
+from rbfrag.hazards.hazard_answer import BranchRate, HazardAnswer
 from rbfrag.hazards.joint_rate import JointRate, joint_at_sites
-from rbfrag.hazards.rate_density import Indices, SiteMass, curve_mass
+from rbfrag.hazards.rate_density import Indices, curve_mass
 from rbfrag.hazards.rate_integration import (
     KernelBlocks,
     Rates,
@@ -46,12 +51,21 @@ from rbfrag.hazards.rate_integration import (
     interval_end,
     rates,
 )
-from rbfrag.hazards.shaking import NOTABLE, SINGLE_CURVE, HazardLevel, describe_ends
+from rbfrag.hazards.shaking import (
+    LAW_TAU,
+    PGA_ALONE,
+    SINGLE_CURVE,
+    TAU,
+    HazardLevel,
+    RateKeywords,
+    parts_by_model,
+)
+from rbfrag.question.drained_bound import is_wet, no_drained_bound, without_water
 from rbfrag.question.fields import AnsweringFields
 from rbfrag.question.keywords import LEVEL, parts_of
-from rbfrag.question.question import is_wet, no_drained_bound, without_water
 from rbfrag.results.diagnostic import Diagnostic, diagnostics
 from rbfrag.results.numbers import percent, relative, return_period
+from rbfrag.solver.quantity import finite_or_none
 from rbfrag.solver.results import FloatArray
 from rbfrag.vocabulary.quantities import ANSWERING, BLOCK, BLOCKS
 
@@ -59,7 +73,7 @@ QUANTILES = (0.05, 0.5, 0.95)
 """Quantiles of a rate over the branches of a logic tree and the model's own uncertainty."""
 
 NUMERICAL_AIM = 1e-3
-"""Relative error of quadrature of a block's rate above which a warning tells of it."""
+"""Relative error of quadrature of a block's rate above which a warning is issued."""
 
 NEVER = 1e-9
 """Annual rate below which no such warning is given: such rates come from the last level alone."""
@@ -81,9 +95,8 @@ def hazard(
 
     λ_f = ∫ P(fails | im) (-dν), ν the hazard curve, as a sum over the nodes of a grid
     (:mod:`rbfrag.hazards.rate_integration`). The interval is that of the model's parameters, by the
-    delta method on ln λ_f. The model is one of the curve's own measure: what else shaking of that
-    level may be is scatter in its P. What a block may be, by its standard deviations, is
-    integrated.
+    delta method on ln λ_f. The model is one of the curve's own measure: it includes the variability
+    between records of the same intensity. Block uncertainty is integrated.
 
     Several blocks stand at one site and share its earthquakes: their rates add up to the failures
     expected a year, and, where asked for, `joint` has the rate of earthquakes in which any of them
@@ -147,27 +160,27 @@ def hazard(
             at_least=at_least, years=years, one_class=one_class, count=count, run=run,
         )  # fmt: skip
 
-    return with_drained_rates(answer, inputs)
-
-
-def with_drained_rates(
-    answer: Callable[[Mapping[str, Any]], HazardAnswer], inputs: Mapping[str, Any]
-) -> HazardAnswer:
-    """Return the rates of the blocks, with the drained rates where there is water pressure.
-
-    Args:
-        answer: answers for fields of blocks.
-        inputs: these fields.
-    """
     result = answer(inputs)
     if not is_wet(inputs):
         return result
-    try:
-        bound = answer(without_water(inputs))
-    except InputError as error:
-        return replace(result, warnings=(*result.warnings, no_drained_bound(error)))
     wet = np.asarray(inputs["water_m"], dtype=np.float64) > 0.0
-    return replace(result, drained=np.where(wet, bound.annual_rate, np.nan))
+    return with_drained_rates(result, lambda: answer(without_water(inputs)), wet)
+
+
+def with_drained_rates(
+    answer: HazardAnswer, drained: Callable[[], HazardAnswer], wet: ArrayLike
+) -> HazardAnswer:
+    """Return the rates of blocks with their drained rates, where these can be computed.
+
+    Args:
+        drained: returns the rates of the same blocks without water pressure.
+        wet: behind which blocks water stands, shape (m,) or one for all.
+    """
+    try:
+        bound = drained()
+    except InputError as error:
+        return replace(answer, warnings=(*answer.warnings, no_drained_bound(error)))
+    return replace(answer, drained=np.where(wet, bound.annual_rate, np.nan))
 
 
 def hazard_at_sites(
@@ -200,7 +213,7 @@ def hazard_at_sites(
     checked_years(years)
     reading = HazardLevel.of(first[0], **meaning)
     by_law = reading.magnitudes_from_g is not None
-    pga_alone = (im_uncertainty.PGA_ALONE,) if reading.name == "pga_g" else ()
+    pga_alone = (PGA_ALONE,) if reading.name == "pga_g" else ()
     if pga_alone and answering.get("model") is None:
         named = [row.name for row in stored_rows(answering.get("db")) if row.term == "pga"]
         by_model = f", or accept the bias with model {named[0]}" if named else ""
@@ -230,10 +243,8 @@ def hazard_at_sites(
             blocks.append((part.indices[rows], group))
     group_rates = [(indices, group, rates(group, mass, level, run)) for indices, group in blocks]
     number = np.ones(sound.size) if count is None else np.asarray(count, dtype=np.float64)
-    result, total = (
-        _join_rates(group_rates, sound.size, len(mass.branches)),
-        _total_half(group_rates, number, level),
-    )
+    result = _join_rates(group_rates, sound.size, len(mass.branches))
+    total = _total_half(group_rates, number, level)
     if one_class:
         result, where = _of_class(result, total), np.zeros(1, dtype=np.intp)
         number = np.ones(1)
@@ -243,15 +254,32 @@ def hazard_at_sites(
     of_joints: tuple[str, ...] = ()
     if (joint or at_least is not None) and not one_class:
         joints, of_joints = joint_at_sites(group_rates, mass, at_least, years, level, number)
-    ends = _beyond(result, mass, where)
+    # lower and upper bounds of the rates from shaking above the last level of the curves
+    assert mass.ends is not None
+    below, at_last, at_end = result.ends
+    last, is_open = mass.ends.rate[where], mass.ends.open[mass.ends.group[where]]
+    above, above_at_most = last * at_last, last * np.where(is_open, 1.0, at_end)
     notes = reading.warnings
     if SINGLE_CURVE in notes and sound.size == 1:
-        bound = rate_bounds(result.rate, *ends[:2], result.ends[0])
-        is_range = bool(is_truncated(result.rate, bound)[0])
-        note = _single_component_note(
-            sites, meaning, branch_weight, blocks[0][1], result, is_range=is_range
-        )
-        notes = (*(text for text in notes if text != SINGLE_CURVE), *note)
+        # a single component is assumed, which RotD50 may give another period than
+        rotd50: CurveKeywords = {**meaning, "component": "rotd50"}
+        as_rotd50 = HazardLevel.of(first[0], **rotd50)
+        rotd50_mass = curve_mass(list(zip(*sites, strict=True)), branch_weight, as_rotd50)
+        block = replace(blocks[0][1], median=as_rotd50.median)
+        period = return_period(float(rates(block, rotd50_mass, LEVEL).rate[0]))
+        notes = tuple(text for text in notes if text != SINGLE_CURVE)
+        bound = rate_bounds(result.rate, above, above_at_most, below)
+        if period == return_period(float(result.rate[0])):
+            pass
+        elif is_truncated(result.rate, bound)[0]:
+            # the answer is a range, which a return period without one would contradict
+            notes += (SINGLE_CURVE,)
+        else:
+            text = (
+                "the hazard curve is assumed to be of a single horizontal component; as RotD50 "
+                f"the return period would be {period}"
+            )
+            notes += (SINGLE_CURVE.replaced(text=text),)
     texts = [
         *remarks,
         *describe_invalid(
@@ -259,8 +287,9 @@ def hazard_at_sites(
             FROM_MEAN if one_class else FROM_SUMS,
         ),
         *notes, *pga_alone,
-        *_of_curves(sites), *(note for part in parts for note in part.model.notes),
-        *describe_ends(first, where, result.rate, *ends[:2], result.ends[0]),
+        *(note for curves in sites for curve in curves for note in curve_warnings(curve, "a rate")),
+        *(note for part in parts for note in part.model.notes),
+        *describe_ends(first, where, result.rate, above, above_at_most, below),
         *_describe_numbers(result), *of_joints,
     ]  # fmt: skip
     edges, contribution = np.empty(0), np.empty((0, 0))
@@ -269,11 +298,25 @@ def hazard_at_sites(
             sites[0], branch_weight, reading, [group for _, group in blocks]
         )
     total_rate = float(np.nansum(number * result.rate))
-    nothing = np.full(result.rate.shape, np.nan)
-    low, high = nothing, nothing
+    probability = probability_in(years, result.rate)
+    if len(mass.branches):
+        probability = np.asarray(branch_weight @ probability_in(years, result.branches))
+    low = high = np.full(result.rate.shape, np.nan)
     quantiles: dict[float, FloatArray] = {}
     if weight is not None:
-        low, high, quantiles = _quantiles(result, weight, level)
+        # quantiles over the branches, without and with parameter uncertainty
+        used = ~np.isnan(weight)
+        branch_rates, shares = result.branches[used], weight[used]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            log_sd = np.divide(result.half, result.rate) / quantiles_of(level).normal
+        low, high = weighted_quantiles(branch_rates, shares, (QUANTILES[0], QUANTILES[-1]))
+        mixed = mixture_quantiles(branch_rates, shares, np.nan_to_num(log_sd), QUANTILES)
+        quantiles = dict(zip(QUANTILES, mixed, strict=True))
+    weights = [None] * len(sites[0]) if weight is None else map(finite_or_none, weight.tolist())
+    branches = [
+        BranchRate(curve_name(curve), w, rates_of, float(np.nansum(number * rates_of)))
+        for curve, w, rates_of in zip(sites[0], weights, result.branches, strict=False)
+    ]
     kinds = np.full(sound.size, "", dtype=object)
     for part in parts:
         kinds[part.indices] = part.model.row.kind
@@ -285,7 +328,7 @@ def hazard_at_sites(
         logic_tree_low=low,
         logic_tree_high=high,
         numerical_error=result.error,
-        probability=_probability(result, branch_weight, years),
+        probability=probability,
         years=years,
         level=level,
         model=_listed(model.name for model in models),
@@ -295,13 +338,13 @@ def hazard_at_sites(
         curves=tuple(first),
         edges=edges,
         contribution=contribution,
-        above=ends[0],
-        above_at_most=ends[1],
-        below=result.ends[0],
+        above=above,
+        above_at_most=above_at_most,
+        below=below,
         measure=first[0].measure,
         joints=joints,
         curve_kind="weighted branches" if weight is not None else first[0].statistic or None,
-        branches=_branches(sites[0], result, weight, number),
+        branches=tuple(branches),
         quantiles=quantiles,
         total_low=float(interval_end(np.array(total_rate), total, -1.0)),
         total_high=float(interval_end(np.array(total_rate), total, 1.0)),
@@ -313,37 +356,6 @@ def hazard_at_sites(
     )
 
 
-def _single_component_note(
-    sites: Sequence[Sequence[HazardCurve]],
-    meaning: CurveKeywords,
-    weight: FloatArray,
-    block: KernelBlocks,
-    result: Rates,
-    *,
-    is_range: bool,
-) -> Iterator[Diagnostic]:
-    """Yield the note that a single component is assumed, unless RotD50 gives the same period.
-
-    Args:
-        is_range: the curve ends or begins too early: the answer is a range, which would
-            contradict a return period without one.
-    """
-    rotd50: CurveKeywords = {**meaning, "component": "rotd50"}
-    reading = HazardLevel.of(sites[0][0], **rotd50)
-    mass = curve_mass(list(zip(*sites, strict=True)), weight, reading)
-    rate = rates(replace(block, median=reading.median), mass, LEVEL).rate
-    period = return_period(float(rate[0]))
-    if period == return_period(float(result.rate[0])):
-        return
-    if is_range:
-        yield SINGLE_CURVE
-    else:
-        yield SINGLE_CURVE.replaced(
-            text="the hazard curve is assumed to be of a single horizontal component; as RotD50 "
-            f"the return period would be {period}"
-        )
-
-
 def _join_rates(
     group_rates: Sequence[tuple[Indices, KernelBlocks, Rates]], size: int, branches: int
 ) -> Rates:
@@ -352,15 +364,12 @@ def _join_rates(
     Without gradients, of which each model has its own; error and outside are parts of the rates.
     """
     rows = np.full((7 + branches, size), np.nan)
-    for indices, _, part_rates in group_rates:
-        scale = np.maximum(part_rates.rate, np.finfo(np.float64).tiny)
-        values = (
-            part_rates.rate,
-            part_rates.half,
-            part_rates.error / scale,
-            part_rates.outside / scale,
-        )
-        rows[:, indices] = [*values, *part_rates.ends, *part_rates.branches]
+    for indices, _, part in group_rates:
+        scale = np.maximum(part.rate, np.finfo(np.float64).tiny)
+        rows[:, indices] = [
+            part.rate, part.half, part.error / scale, part.outside / scale, *part.ends,
+            *part.branches,
+        ]  # fmt: skip
     return Rates(rows[0], rows[1], rows[:0], rows[2], rows[3], rows[7:], rows[4:7])
 
 
@@ -390,12 +399,10 @@ def _total_half(
 
     Blocks of one model have its parameters in common; those of several are independent.
     """
-    gradients: dict[str, tuple[Any, FloatArray]] = {}
+    gradients: dict[str, tuple[Any, Any]] = {}
     for indices, blocks, part_rates in group_rates:
         model = blocks.model
-        before = gradients.get(model.name, (model.errors, np.zeros(part_rates.gradient.shape[0])))[
-            1
-        ]
+        _, before = gradients.get(model.name, (None, 0.0))
         gradients[model.name] = model.errors, before + part_rates.gradient @ count[indices]
     halves = [
         float(half_width(errors, gradient[:, None], level)[0])
@@ -404,58 +411,8 @@ def _total_half(
     return float(np.sqrt(np.square(halves).sum()))
 
 
-def _beyond(result: Rates, mass: SiteMass, site: Indices) -> tuple[FloatArray, FloatArray]:
-    """Return lower and upper bounds of the rates from shaking above the last level [1/a]."""
-    ends = mass.ends
-    assert ends is not None
-    last = ends.rate[site]
-    return last * result.ends[1], last * np.where(ends.open[ends.group[site]], 1.0, result.ends[2])
-
-
-def _probability(result: Rates, weight: FloatArray, years: float) -> FloatArray:
-    if not result.branches.size:
-        return probability_in(years, result.rate)
-    return np.asarray(weight @ probability_in(years, result.branches))
-
-
-def _quantiles(
-    result: Rates, weight: FloatArray, level: float
-) -> tuple[FloatArray, FloatArray, dict[float, FloatArray]]:
-    """Return quantiles of rates over the branches, without and with parameter uncertainty."""
-    used = ~np.isnan(weight)
-    branch_rates, shares = result.branches[used], weight[used]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        log_sd = np.divide(result.half, result.rate) / quantiles_of(level).normal
-    low, high = weighted_quantiles(branch_rates, shares, (QUANTILES[0], QUANTILES[-1]))
-    mixed = mixture_quantiles(branch_rates, shares, np.nan_to_num(log_sd), QUANTILES)
-    return low, high, dict(zip(QUANTILES, mixed, strict=True))
-
-
 def _listed(names: Iterable[str]) -> str:
     return ", ".join(filter(None, dict.fromkeys(names)))
-
-
-def _branches(
-    curves: Sequence[HazardCurve], result: Rates, weight: FloatArray | None, count: FloatArray
-) -> tuple[BranchRate, ...]:
-    if len(curves) == 1:
-        return ()
-    return tuple(
-        BranchRate(
-            curve_name(curve),
-            None if weight is None or np.isnan(weight[i]) else float(weight[i]),
-            result.branches[i],
-            float(np.nansum(count * result.branches[i])),
-        )
-        for i, curve in enumerate(curves)
-    )
-
-
-def _of_curves(sites: Sequence[Sequence[HazardCurve]]) -> Iterator[str]:
-    for curves in sites:
-        for curve in curves:
-            yield from curve.warnings
-            yield from quantile_warning(curve, "a rate")
 
 
 def _describe_numbers(result: Rates) -> Iterator[str]:

@@ -11,13 +11,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbfrag.fragility import describe
-from rbfrag.hazards import im_uncertainty
-from rbfrag.hazards.event_set import EventSet
-from rbfrag.hazards.joint_rate import NO_LAW
+from rbfrag.hazards.event_set import (
+    QUANTILES,
+    SOURCES,
+    Ends,
+    EventSet,
+    MeanUncertainty,
+    ends_by_name,
+)
+from rbfrag.hazards.joint_rate import DEPENDENT, INDEPENDENT, NO_LAW
 from rbfrag.hazards.portfolio import Portfolio
 from rbfrag.hazards.rate_integration import interval_end
-from rbfrag.hazards.standing_blocks import DEPENDENT, INDEPENDENT
-from rbfrag.hazards.uncertainty import QUANTILES, SOURCES, Ends, MeanUncertainty, ends_by_name
+from rbfrag.hazards.shaking import between_measures, factors_between
 from rbfrag.results.numbers import (
     annual_rate,
     annual_rates,
@@ -51,7 +56,7 @@ class Exceedance:
         event_set_sampling: both ends of its interval by event-set sampling.
         fragility: both ends of that by the parameters of the fragility model.
         logic_tree: 5th and 95th percentile over the realizations; None where these cannot be
-            distinguished (:class:`~rbfrag.hazards.uncertainty.MeanUncertainty`).
+            distinguished (:class:`~rbfrag.hazards.event_set.MeanUncertainty`).
         largest_of_year: probability that the largest event of a year reaches it; None of a
             scenario.
         sum_of_year: probability that the sum over a year does; None of a scenario.
@@ -215,7 +220,16 @@ class LossAnswer(Result):
         for label, text in self._numbers():
             yield f"{label:<{_LABEL_WIDTH}}{text}"
         yield "Uncertainty of expected failures by source (not combined):"
-        yield f"  {' · '.join(self._sources())}"
+        sources, uncertainty = [], self.uncertainty["average_annual_failures"]
+        for key, source in SOURCES.items():
+            if (ends := getattr(uncertainty, key)) is not None:
+                text = "–".join(map(two_digits, ends))
+                text = text if self.events.is_scenario else annual_rates(*ends)
+                sources.append(f"{source} {text}{' (5th–95th)' if key == 'logic_tree' else ''}")
+        if self.tau is not None:
+            low, high = factors_between(self.tau)
+            sources.append(f"choice of intensity measure, rate × {low:.2f}–{high:.2f}")
+        yield f"  {' · '.join(sources)}"
 
     def _numbers(self) -> Iterator[tuple[str, str]]:
         blocks = count_of(int(self.portfolio.count.sum()), "block")
@@ -237,18 +251,6 @@ class LossAnswer(Result):
 
     def _sampling(self, ends: str) -> str:
         return f"{confidence(self.level, ends)}, event-set sampling"
-
-    def _sources(self) -> Iterator[str]:
-        """Yield the interval of the expected failures from each source of uncertainty."""
-        uncertainty = self.uncertainty["average_annual_failures"]
-        for key, source in SOURCES.items():
-            if (ends := getattr(uncertainty, key)) is not None:
-                text = "–".join(map(two_digits, ends))
-                text = text if self.events.is_scenario else annual_rates(*ends)
-                yield f"{source} {text}{' (5th–95th)' if source == 'logic tree' else ''}"
-        if self.tau is not None:
-            low, high = im_uncertainty.factors_between(self.tau)
-            yield f"choice of intensity measure, rate × {low:.2f}–{high:.2f}"
 
     def lines(self) -> Iterator[TextLine]:
         """Yield the events, their intensity measures, bounds, and the models."""
@@ -322,8 +324,12 @@ class LossAnswer(Result):
                 means |= {annual: None, f"{annual}_error": None}
                 means |= {given_event: mean, f"{given_event}_error": error}
         if scenario:
-            means |= self._quantiles()
-        means["between_measures"] = im_uncertainty.as_dict(self.tau)
+            drawn = ("failures", "loss") if self.has_losses else ("failures",)
+            for i, name in enumerate(drawn if self.quantiles.size else ()):
+                for q, by_law in zip(QUANTILES, self.quantiles[:, i].T.tolist(), strict=True):
+                    key = f"{name}_p{round(100 * q):02d}"
+                    means[key] = by_law[0] if len(by_law) == 1 else by_law
+        means["between_measures"] = between_measures(self.tau)
         means["uncertainty"] = [
             row for name, mean in self.uncertainty.items() for row in mean.as_dicts(name)
         ]
@@ -374,16 +380,6 @@ class LossAnswer(Result):
             return {key: next(iter(lists.values()), [])}
         by_law = {law.replace(" ", "_"): rows for law, rows in lists.items()}
         return {key: [], f"{key}_bounds": by_law}
-
-    def _quantiles(self) -> dict[str, Any]:
-        if not self.quantiles.size:
-            return {}
-        names = ["failures", "loss"] if self.has_losses else ["failures"]
-        result: dict[str, Any] = {}
-        for i, name in enumerate(names):
-            for q, values in zip(QUANTILES, self.quantiles[:, i].T.tolist(), strict=True):
-                result[f"{name}_p{round(100 * q):02d}"] = values[0] if len(values) == 1 else values
-        return result
 
     def _blocks(self) -> list[dict[str, Any]]:
         """Return one row of answers for each row of the table of blocks."""

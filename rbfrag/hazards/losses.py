@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from rbfrag.errors import InputError
 from rbfrag.fragility import describe
 from rbfrag.fragility.confidence import quantiles_of
+from rbfrag.hazards.curve import NOTABLE
 from rbfrag.hazards.event_counts import (
     PAIRS_AT_ONCE,
     SAMPLES_AT_ONCE,
@@ -20,21 +21,21 @@ from rbfrag.hazards.event_counts import (
     PartCounts,
     count_years,
     laws_of,
+    log_shaking,
     shift_error,
 )
 from rbfrag.hazards.event_means import EventMeans, axes_of, event_means
-from rbfrag.hazards.event_set import EventSet
-from rbfrag.hazards.joint_rate import BOUNDS_GIVEN, SEVERAL_MODELS, UNKNOWN_TO_MODEL
-from rbfrag.hazards.loss_answer import Exceedance, LossAnswer
-from rbfrag.hazards.portfolio import Portfolio
-from rbfrag.hazards.rate_integration import interval_end
-from rbfrag.hazards.shaking import NOTABLE
-from rbfrag.hazards.uncertainty import (
+from rbfrag.hazards.event_set import (
     QUANTILES,
+    EventSet,
     MeanUncertainty,
     branch_ends,
     reached_interval,
 )
+from rbfrag.hazards.joint_rate import BOUNDS_GIVEN, SEVERAL_MODELS, UNKNOWN_TO_MODEL
+from rbfrag.hazards.loss_answer import Exceedance, LossAnswer
+from rbfrag.hazards.portfolio import Portfolio
+from rbfrag.hazards.rate_integration import interval_end
 from rbfrag.results.diagnostic import Diagnostic
 from rbfrag.results.numbers import percent
 from rbfrag.solver.results import FloatArray
@@ -90,8 +91,10 @@ def event_losses(
     shifted = shifted_portfolios(portfolio) if samples else ()
     groups = _groups(events, portfolio, samples) if samples or means is None else []
     none = _only(events, np.empty(0, dtype=np.intp))
-    common = EventYears(-1, portfolio, none, *ends, samples, seed, shifted)
-    parts = (EventBatch(number, _only(events, group)) for number, group in enumerate(groups))
+    u = log_shaking(events, portfolio)
+    range_u = (float(u.min(initial=np.inf)), float(u.max(initial=-np.inf)))
+    common = EventYears(-1, portfolio, none, *ends, samples, seed, shifted, range_u, {})
+    parts = ((number, _only(events, group)) for number, group in enumerate(groups))
     do: Run = run or (lambda work, _, shared: (count_years(shared, batch) for batch in work))
     events_done = 0
     results: dict[int, PartCounts] = {}
@@ -100,7 +103,67 @@ def event_losses(
         events_done += groups[result.number].size
         if on_progress is not None:
             on_progress(events_done, sum(group.size for group in groups))
-    return _answer(events, portfolio, ends, groups, results, means, samples, seed, level)
+    n, laws = events.event_id.size, laws_of(portfolio)
+    order = [results[i] for i in range(len(groups))]
+
+    def gather(name: str, *shape: int) -> FloatArray:
+        values = np.zeros((*shape, n))
+        for group, part in zip(groups, order, strict=True):
+            values[..., group] = getattr(part, name)
+        return values
+
+    if means is None:
+        blocks = sum((part.blocks for part in order), np.zeros((3, portfolio.size)))
+        unknown = np.full(portfolio.size, np.nan)
+        means = EventMeans(
+            gather("failures"), gather("loss"), gather("bounds", 2), blocks, unknown, np.nan, np.nan
+        )
+    any_fails = gather("any_fails", len(laws))
+    variance = gather("loss_variance", len(laws)) if order else np.full((len(laws), n), np.nan)
+    if not order:  # known without samples alone where no law matters, as of single blocks
+        any_bounds = means.bounds[:1] if portfolio.count.sum() < 2 else np.full((1, n), np.nan)
+        any_fails = means.bounds if len(laws) > 1 else any_bounds
+    curves = [
+        Curves.merge(parts) if parts else None
+        for parts in ([part.counts for part in order], [part.losses for part in order])
+    ]
+    exceedance, loss_exceedance = (
+        {law: _curve(events, curve, end, i, len(laws), level) for i, law in enumerate(laws)}
+        if samples
+        else {}
+        for curve, end in zip(curves, ends, strict=True)
+    )
+    of_any = curves[0].events[0, :, 0] if curves[0] and ends[0].size else np.empty(0)
+    half_of_any = np.nan
+    if len(laws) == 1 and of_any.size > 1:
+        half_of_any = float(shift_error(of_any) * quantiles_of(level).normal)
+    quantities = {
+        "average_annual_failures": (means.failures, means.failures_half),
+        "average_annual_loss": (means.loss, means.loss_half),
+        "annual_rate_any": (any_fails[0], events.weight @ any_fails[0] * half_of_any),
+    }
+    if portfolio.loss is None:
+        del quantities["average_annual_loss"]
+    return LossAnswer(
+        events, portfolio, samples, seed, level, laws,
+        failures=means.failures,
+        loss=means.loss,
+        loss_variance=variance,
+        any_fails=any_fails,
+        bounds=means.bounds,
+        block_rates=_of_rows(events, portfolio, means),
+        uncertainty={
+            name: MeanUncertainty.of(
+                events, values, half, level, are_probabilities=name == "annual_rate_any"
+            )
+            for name, (values, half) in quantities.items()
+            if name != "annual_rate_any" or (len(laws) == 1 and not np.isnan(values).any())
+        },
+        exceedance=exceedance,
+        loss_exceedance=loss_exceedance,
+        quantiles=_scenario_quantiles(events, groups, order, len(laws), samples),
+        warnings=_warnings(events, portfolio, laws, means.blocks, any_fails),
+    )  # fmt: skip
 
 
 def _groups(events: EventSet, portfolio: Portfolio, samples: int) -> list[NDArray[np.intp]]:
@@ -158,83 +221,6 @@ def _ends(portfolio: Portfolio) -> tuple[FloatArray, FloatArray]:
     return counts, np.geomspace(low, max(high, low), _STEPS if high > low else 1) * _REACHED
 
 
-def _answer(
-    events: EventSet,
-    portfolio: Portfolio,
-    ends: tuple[FloatArray, FloatArray],
-    groups: Sequence[NDArray[np.intp]],
-    results: Mapping[int, PartCounts],
-    means: EventMeans | None,
-    samples: int,
-    seed: int,
-    level: float,
-) -> LossAnswer:
-    n, laws, order = (
-        events.event_id.size,
-        laws_of(portfolio),
-        [results[i] for i in range(len(groups))],
-    )
-
-    def gather(name: str, *shape: int) -> FloatArray:
-        values = np.zeros((*shape, n))
-        for group, part in zip(groups, order, strict=True):
-            values[..., group] = getattr(part, name)
-        return values
-
-    if means is None:
-        blocks = sum((part.blocks for part in order), np.zeros((3, portfolio.size)))
-        unknown = np.full(portfolio.size, np.nan)
-        means = EventMeans(
-            gather("failures"), gather("loss"), gather("bounds", 2), blocks, unknown, np.nan, np.nan
-        )
-    any_fails = gather("any_fails", len(laws))
-    variance = gather("loss_variance", len(laws)) if order else np.full((len(laws), n), np.nan)
-    if not order:  # known without samples alone where no law matters, as of single blocks
-        any_bounds = means.bounds[:1] if portfolio.count.sum() < 2 else np.full((1, n), np.nan)
-        any_fails = means.bounds if len(laws) > 1 else any_bounds
-    curves = [
-        Curves.merge(parts) if parts else None
-        for parts in ([part.counts for part in order], [part.losses for part in order])
-    ]
-    exceedance, loss_exceedance = (
-        {law: _curve(events, curve, end, i, len(laws), level) for i, law in enumerate(laws)}
-        if samples
-        else {}
-        for curve, end in zip(curves, ends, strict=True)
-    )
-    of_any = curves[0].events[0, :, 0] if curves[0] and ends[0].size else np.empty(0)
-    quantities = {
-        "average_annual_failures": (means.failures, means.failures_half),
-        "average_annual_loss": (means.loss, means.loss_half),
-        "annual_rate_any": (
-            any_fails[0],
-            events.weight @ any_fails[0] * _half_of(of_any, len(laws), level),
-        ),
-    }
-    if portfolio.loss is None:
-        del quantities["average_annual_loss"]
-    return LossAnswer(
-        events, portfolio, samples, seed, level, laws,
-        failures=means.failures,
-        loss=means.loss,
-        loss_variance=variance,
-        any_fails=any_fails,
-        bounds=means.bounds,
-        block_rates=_of_rows(events, portfolio, means),
-        uncertainty={
-            name: MeanUncertainty.of(
-                events, values, half, level, are_probabilities=name == "annual_rate_any"
-            )
-            for name, (values, half) in quantities.items()
-            if name != "annual_rate_any" or (len(laws) == 1 and not np.isnan(values).any())
-        },
-        exceedance=exceedance,
-        loss_exceedance=loss_exceedance,
-        quantiles=_scenario_quantiles(events, groups, order, len(laws), samples),
-        warnings=_warnings(events, portfolio, laws, means.blocks, any_fails),
-    )  # fmt: skip
-
-
 def shifted_portfolios(portfolio: Portfolio) -> tuple[Portfolio, ...]:
     """Return the portfolio with models one standard deviation away along each principal axis.
 
@@ -251,13 +237,6 @@ def shifted_portfolios(portfolio: Portfolio) -> tuple[Portfolio, ...]:
                 models = (*portfolio.models[:number], moved, *portfolio.models[number + 1 :])
                 result.append(replace(portfolio, models=models))
     return tuple(result)
-
-
-def _half_of(rates: FloatArray, laws: int, level: float) -> float:
-    """Return the relative half-width of the interval of a rate; rates as for `shift_error`."""
-    if laws > 1 or rates.size < 2:
-        return np.nan
-    return float(shift_error(rates) * quantiles_of(level).normal)
 
 
 def _curve(

@@ -93,12 +93,23 @@ class Portfolio:
 
         # Rows are sorted by site, since everything downstream works site by site; `row` restores
         # the order of the table.
-        sites = _site_indices(columns, site_ids)
+        sites = np.zeros(n, dtype=np.int64)
+        if "site_id" in columns:
+            index = {name: i for i, name in enumerate(site_ids)}
+            sites = np.array([index[str(name)] for name in columns["site_id"]], dtype=np.int64)
+        elif len(site_ids) != 1:
+            raise InputError(
+                f"the blocks have no column site_id, and there are {len(site_ids)} sites: name the "
+                f"site of each block, such as {', '.join(map(repr, site_ids[:3]))}"
+            )
         kinds = columns["kind"].tolist()
         chosen = {kind: models[kind] for kind in dict.fromkeys(kinds)}
         model_index = {kind: i for i, kind in enumerate(chosen)}
         count, weight = numbers("count", 1.0), numbers("weight", 1.0)
         row = np.argsort(sites, kind="stable")
+        if len(chosen) == 1 and count.sum() > 1.0:
+            # workers get the models as rows: what blocks share is estimated before
+            _ = [model.dependence for model in chosen.values()]
         loss = numbers("loss", 0.0) * weight if "loss" in columns else None
         blocks = [chosen[kind].method.block for kind in kinds]
         inputs = numbers_in(columns)
@@ -135,7 +146,7 @@ class Portfolio:
         )
 
     def __getstate__(self) -> dict[str, Any]:
-        # models read anew travel as rows alone: their formulas cannot
+        # models that were read again travel as rows alone: their formulas cannot
         return {field.name: getattr(self, field.name) for field in fields(self)}
 
     @property
@@ -248,16 +259,3 @@ class Portfolio:
                 + " and ".join(f"{n} = {v[wrong]:g}" for n, v in self.numbers.items())
             )
         return p, in_domain
-
-
-def _site_indices(columns: Mapping[str, Any], site_ids: Sequence[str]) -> IntArray:
-    names = columns["block_id"]
-    if "site_id" not in columns:
-        if len(site_ids) == 1:
-            return np.zeros(len(names), dtype=np.int64)
-        raise InputError(
-            f"the blocks have no column site_id, and there are {len(site_ids)} sites: name the "
-            f"site of each block, such as {', '.join(map(repr, site_ids[:3]))}"
-        )
-    index = {name: i for i, name in enumerate(site_ids)}
-    return np.array([index[str(name)] for name in columns["site_id"]], dtype=np.int64)

@@ -12,7 +12,7 @@ mean to a model, the scatter of a single component about it, is put on the mass.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -22,9 +22,7 @@ from scipy.interpolate import PchipInterpolator
 from scipy.sparse import csr_array
 
 from rbfrag.hazards.curve import HazardCurve
-from rbfrag.hazards.event_set import EventSet, IntArray
 from rbfrag.hazards.shaking import HazardLevel
-from rbfrag.solver.integrator.compiled import inner_kernel, kernel
 from rbfrag.solver.results import FloatArray
 
 Indices = NDArray[np.intp]
@@ -121,18 +119,14 @@ class CurveEnds:
 
     Args:
         group: which of the rows each site has, shape (sites,).
-        first: unit mass at the first level, rows x nodes.
-        last: the same at the last level with a rate.
-        end: the same at the level from which on nothing is exceeded; a row of 0 where the curve
-            states none.
+        units: unit masses at the first level, at the last level with a rate, and at the level from
+            which on nothing is exceeded (0 where the curve states none), 3 x rows x nodes.
         open: whether it states none, shape (rows,).
         rate: rate of the last level of each site [1/a], shape (sites,).
     """
 
     group: Indices
-    first: FloatArray
-    last: FloatArray
-    end: FloatArray
+    units: FloatArray
     open: NDArray[np.bool_]
     rate: FloatArray
 
@@ -192,23 +186,27 @@ def curve_mass(
     grid = Grid.over(step, low, math.log(max(highest)), smoothing.reach)
     masses = np.stack([under(branch, grid) for branch in branches])
     masses = np.stack([smoothing.of(mass) for mass in masses])
+    keys: dict[tuple[float, float, float | None], int] = {}
+    group = np.array(
+        [
+            keys.setdefault((c.levels[0], c.levels[-1], c.end_level), len(keys))
+            for c in branches[int(np.argmax(weight))]
+        ]
+    )
+    levels = np.array([*keys], dtype=np.float64).T
+    is_open = np.isnan(levels[2])
+    at_levels = grid.spread(np.log(np.nan_to_num(levels, nan=1.0)).ravel(), linear=True)
+    units = at_levels.toarray().T.reshape(*levels.shape, grid.size)
+    units[2, is_open] = 0.0
+    last = weight @ [[float(curve.annual_rate[-1]) for curve in branch] for branch in branches]
     return SiteMass(
         grid,
         np.tensordot(weight, masses, axes=1),
         masses if len(branches) > 1 else np.empty((0, *masses.shape[1:])),
         weight,
         smoothing,
-        _ends(branches, weight, grid, smoothing),
+        CurveEnds(group, smoothing.of(units), is_open, last),
     )
-
-
-def _alike(curves: Sequence[HazardCurve]) -> Iterator[tuple[Indices, HazardCurve]]:
-    """Yield groups of sites whose curves have the same levels, each with one of the curves."""
-    groups: dict[bytes, list[int]] = {}
-    for i, curve in enumerate(curves):
-        groups.setdefault(curve.levels.tobytes(), []).append(i)
-    for indices in groups.values():
-        yield np.array(indices, dtype=np.intp), curves[indices[0]]
 
 
 def under(curves: Sequence[HazardCurve], grid: Grid, *, beyond: bool = True) -> FloatArray:
@@ -224,8 +222,11 @@ def under(curves: Sequence[HazardCurve], grid: Grid, *, beyond: bool = True) -> 
         beyond: count shaking beyond the last level as that level.
     """
     mass = np.zeros((len(curves), grid.size))
-    for indices, curve in _alike(curves):
-        u = np.log(curve.levels)
+    by_levels: dict[bytes, list[int]] = {}  # sites whose curves have the same levels
+    for i, curve in enumerate(curves):
+        by_levels.setdefault(curve.levels.tobytes(), []).append(i)
+    for indices in map(np.array, by_levels.values()):
+        u = np.log(curves[indices[0]].levels)
         inner = grid.u[(grid.u > u[0]) & (grid.u < u[-1])]
         edges = np.concatenate([u[:1], inner, u[-1:]])
         half = 0.5 * np.diff(edges)
@@ -256,102 +257,6 @@ _SITES_AT_ONCE = 512
 
 TINY = float(np.finfo(np.float64).tiny)
 ROUNDING = 1e-12
-
-
-def _ends(
-    branches: Sequence[Sequence[HazardCurve]], weight: FloatArray, grid: Grid, smoothing: Smoothing
-) -> CurveEnds:
-    curves = branches[int(np.argmax(weight))]
-    keys: dict[tuple[float, float, float | None], int] = {}
-    group = np.array(
-        [keys.setdefault((c.levels[0], c.levels[-1], c.end_level), len(keys)) for c in curves]
-    )
-
-    def unit(levels: Sequence[float | None]) -> FloatArray:
-        values = np.array([1.0 if level is None else level for level in levels])
-        rows = grid.spread(np.log(values), linear=True).toarray().T
-        rows[[level is None for level in levels]] = 0.0
-        return smoothing.of(rows)
-
-    first, last, end = zip(*keys, strict=True)
-    return CurveEnds(
-        group, unit(first), unit(last), unit(end), np.array([level is None for level in end]),
-        weight @ [[float(curve.annual_rate[-1]) for curve in branch] for branch in branches],
-    )  # fmt: skip
-
-
-def event_mass(
-    events: EventSet, name: str, sites: Indices, shaking: HazardLevel
-) -> tuple[SiteMass, FloatArray, FloatArray]:
-    """Return the rate density of an event set at sites, and u of each row.
-
-    Args:
-        name: the measure.
-        sites: indices of the sites, rising.
-
-    Returns:
-        The mass; one of squared weights without scatter, sites x nodes; and ln(level) of the rows,
-        -inf where nothing shook.
-    """
-    step, smoothing = smoothing_of(shaking)
-    with np.errstate(divide="ignore"):
-        u = np.log(events.measures[name])
-    place = np.full(len(events.site_ids), -1)
-    place[sites] = np.arange(sites.size)
-    seen = np.isfinite(u) & (place[events.site] >= 0)
-    ends = (u[seen].min(), u[seen].max()) if seen.any() else (0.0, 0.0)
-    grid = Grid.over(step, float(ends[0]), float(ends[1]), smoothing.reach)
-    masses = np.zeros((2, sites.size, grid.size))
-    add_mass(masses, place, events.site, events.event, events.weight, u, *grid)
-    site_mass = smoothing.of(masses[0])
-    empty = np.empty((0, *site_mass.shape))
-    return SiteMass(grid, site_mass, empty, np.ones(1), smoothing), masses[1], u
-
-
-@kernel
-def add_mass(
-    mass: FloatArray,
-    place: Indices,
-    site: IntArray,
-    event: IntArray,
-    weight: FloatArray,
-    u: FloatArray,
-    step: float,
-    first: int,
-    size: int,
-) -> None:
-    """Add the weights of events, and their squares, to the nodes near the shaking of each row.
-
-    Args:
-        mass: what is added to, 2 x sites x nodes.
-        place: index among these sites of each site, -1 for one that is left out.
-        site: site of each row.
-        event: event of each row.
-        weight: of each event.
-        u: ln(level) of each row; what is not finite is left out.
-        step: of the grid, as are `first` and `size`.
-    """
-    for row in range(u.size):
-        site_row = place[site[row]]
-        if site_row < 0 or not np.isfinite(u[row]):
-            continue
-        start, a, b, c, d = cubic_at(u[row], step, first, size)
-        w = weight[event[row]]
-        for node, part in ((0, a), (1, b), (2, c), (3, d)):
-            mass[0, site_row, start + node] += part * w
-            mass[1, site_row, start + node] += part * w * w
-
-
-@inner_kernel
-def cubic_at(
-    u: float, step: float, first: int, size: int
-) -> tuple[int, float, float, float, float]:
-    """Return the first of four nodes about u and their weights; see :meth:`Grid.cubic`."""
-    x = u / step - first
-    start = min(max(int(np.floor(x)) - 1, 0), size - 4)
-    a = min(max(x, 0.0), size - 1.0) - start
-    b, c, d = a - 1.0, a - 2.0, a - 3.0
-    return start, -b * c * d / 6.0, a * c * d / 2.0, -a * b * d / 2.0, a * b * c / 6.0
 
 
 def of_sites(mass: SiteMass, sites: slice) -> SiteMass:

@@ -282,21 +282,15 @@ class RatePart(NamedTuple):
     level: float
 
 
-class PartRates(NamedTuple):
-    """The rates of one part of the work."""
-
-    number: int
-    rates: Rates
+Run = Callable[[Iterator[RatePart], int], Iterator[tuple[int, Rates]]]
+"""Does the parts of the work, of which the number is given, and yields their numbers and rates in
+any order."""
 
 
-Run = Callable[[Iterator[RatePart], int], Iterator[PartRates]]
-"""Does the parts of the work, of which the number is given, and yields the results in any order."""
-
-
-def rate_part(part: RatePart) -> PartRates:
-    """Return the rates of one part; a module-level function, for worker processes."""
+def rate_part(part: RatePart) -> tuple[int, Rates]:
+    """Return number and rates of one part; a module-level function, for worker processes."""
     blocks = KernelBlocks(FragilityModel.from_row(part.row), **part.blocks)
-    return PartRates(part.number, rates(blocks, part.mass, part.level))
+    return part.number, rates(blocks, part.mass, part.level)
 
 
 def rates(blocks: KernelBlocks, mass: SiteMass, level: float, run: Run | None = None) -> Rates:
@@ -426,7 +420,7 @@ def sums_of(blocks: KernelBlocks, table: NodeTable, mass: SiteMass, first: int) 
     off = against(mass.mass, _off_by(table.probability))
     ends = []
     if mass.ends is not None:
-        for unit in (mass.ends.first, mass.ends.last, mass.ends.end):
+        for unit in mass.ends.units:
             group = unit[mass.ends.group] if unit.shape[0] > 1 else unit
             ends.append(np.minimum(against(group, table.probability), 1.0))
     return [

@@ -1,30 +1,140 @@
-"""Interpretation of the levels of a hazard curve by a model: measure, factor and dispersion."""
+"""Levels of a hazard curve as a model uses them: measure, factor, dispersion, and blocks by model.
+
+A model of PGA averages over the PGV that goes with a PGA in the reference, whose earthquakes are
+stronger than those that most often make such a PGA. PGV and SA(1.0) need no magnitude.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Unpack
+from typing import Any, NamedTuple, Unpack
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rbfrag.errors import InputError
+from rbfrag.errors import InputError, UnknownModelError
+from rbfrag.fragility.model import FragilityModel
 from rbfrag.fragility.uncertain import scatter_steps
 from rbfrag.hazards.curve import ANSWERED, CurveKeywords, HazardCurve
-from rbfrag.hazards.im_uncertainty import CONVERSIONS, velocity_conversion
+from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.question.components import SINGLE_COMPONENT, Component, component_named
+from rbfrag.question.fields import AnsweringFields, BlockKeywords, V
+from rbfrag.question.keywords import model_for
+from rbfrag.question.predict_arrays import block_reasons_of, blocks_of_arrays
 from rbfrag.results.diagnostic import Diagnostic
-from rbfrag.results.numbers import annual_rate, percent
 from rbfrag.solver.results import FloatArray
+
+TAU = {"pgv_m_s": 0.15, "sa10_g": 0.15}
+"""Standard deviation of ln rate between the measures that may be asked for."""
+
+LAW_TAU = 0.25
+"""The same where PGV is taken from PGA and magnitude."""
+
+PREFERRED = ("pgv_m_s", "sa10_g")
+"""The measures that answer by themselves, the better first."""
+
+PGA_ALONE = Diagnostic(
+    "a rate from PGA alone is biased: the model averages over the PGV of the strong earthquakes "
+    "that it is fitted to, and smaller earthquakes have less PGV at the same PGA",
+    "pga_alone",
+)
+
+_CONSTANT, _SLOPE, _BY_MAGNITUDE, _SCATTER, _SATURATION = -0.623, 0.873, 0.472, 0.434, 7.6
+
+
+def velocity_of(pga_g: FloatArray, magnitude: FloatArray) -> FloatArray:
+    """Return the median PGV [m/s] of a single component at a PGA [g] and magnitude.
+
+    ln PGV = -.623 + .873 ln PGA + .472 (min(M, 7.6) - 6), of the motions of the shipped reference.
+    """
+    with np.errstate(divide="ignore"):
+        log = _CONSTANT + _SLOPE * np.log(pga_g)
+    return np.asarray(np.exp(log + _BY_MAGNITUDE * (np.minimum(magnitude, _SATURATION) - 6.0)))
+
+
+def component_of_velocity(component: Component) -> Component:
+    """Return the component of PGV by :func:`velocity_of`, where PGA is of a given component."""
+    return replace(
+        component,
+        amplitude=component.ratio("pga_g") ** _SLOPE,
+        sigma=math.hypot(_SCATTER, _SLOPE * component.sigma),
+    )
+
+
+def factors_between(tau: float) -> tuple[float, float]:
+    """Return the 95 % range of the ratio to rates by other intensity measures: exp(±1.96 tau)."""
+    return math.exp(-1.96 * tau), math.exp(1.96 * tau)
+
+
+def between_measures(tau: float | None) -> dict[str, float] | None:
+    """Return the spread between measures under the keys of the JSON contract."""
+    if tau is None:
+        return None
+    low, high = factors_between(tau)
+    return {"tau": tau, "factor_low": low, "factor_high": high}
+
+
+def between_measures_text(tau: float) -> str:
+    """Return the text on the factors by which another intensity measure may change a rate."""
+    low, high = factors_between(tau)
+    return f"Not included in the interval: choice of intensity measure, rate × {low:.2f}–{high:.2f}"
+
+
+@dataclass(frozen=True)
+class VelocityConversion:
+    """PGV [m/s] = `factor` · SA(`period_s`) [g] in the median.
+
+    Args:
+        name: name in options.
+        period_s: oscillator period [s].
+        factor: PGV over spectral acceleration [m/s per g].
+        scatter: standard deviation of ln(PGV/converted) that is taken where none is given: that
+            of the 749 horizontal motions of the shipped reference. The publications give a
+            factor for the median, and no scatter that goes with these motions.
+        source: where it is published.
+    """
+
+    name: str
+    period_s: float
+    factor: float
+    scatter: float
+    source: str
+
+
+CONVERSIONS: Mapping[str, VelocityConversion] = {
+    item.name: item
+    for item in (
+        VelocityConversion(
+            "newmark_hall_1982",
+            1.0,
+            STANDARD_GRAVITY_M_S2 / (2.0 * math.pi * 1.65),
+            0.48,
+            "Newmark and Hall (1982), SA(1 s)/PGV = 2π·1.65/g at 5 % damping",
+        ),
+        VelocityConversion(
+            "bommer_alarcon_2006",
+            0.5,
+            STANDARD_GRAVITY_M_S2 / 20.0,
+            0.47,
+            "Bommer and Alarcón (2006), PGV [cm/s] = SA(0.5 s) [cm/s²]/20",
+        ),
+    )
+}
+"""The conversions by name."""
+
+
+def velocity_conversion(name: str) -> VelocityConversion:
+    """Return the conversion of that name."""
+    if name not in CONVERSIONS:
+        raise InputError(f"unknown conversion {name!r}: it must be {' or '.join(CONVERSIONS)}")
+    return CONVERSIONS[name]
+
 
 _SCATTER_POINTS = 25
 _REACH = 6.0
 """Standard deviations of the scatter that are integrated over, to both sides."""
-
-NOTABLE = 0.01
-"""Part of a rate, or probability, from which on a warning tells of it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,7 +192,8 @@ class HazardLevel:
 
         Args:
             factor: what it is multiplied by.
-            spread: standard deviation of the logarithm of what results, beside the component's.
+            spread: standard deviation of the logarithm of the result, in addition to that of
+                the component.
             ratio: ratio of the component, where the levels are of another measure; None for that
                 of `name`.
         """
@@ -118,7 +229,13 @@ def _measure(
             both = ("convert_sigma", "convert")
             raise InputError("convert_sigma requires convert: omit it", fields=both)
         if curve.known_as is None:
-            raise InputError(_no_model(curve), fields=("convert",))
+            also = [item.name for item in CONVERSIONS.values() if curve.is_of(item.period_s)]
+            converted = f", or turn it into PGV with convert {' or '.join(also)}" if also else ""
+            raise InputError(
+                f"{curve.source}: no model uses {curve.imt} alone: give a curve of one of "
+                f"{ANSWERED}{converted}",
+                fields=("convert",),
+            )
         return curve.known_as, 1.0, 0.0
     if curve.measure != "sa_g":
         raise InputError(
@@ -153,51 +270,62 @@ def _measure(
     return "pgv_m_s", used.factor, spread
 
 
-def _no_model(curve: HazardCurve) -> str:
-    also = [item.name for item in CONVERSIONS.values() if curve.is_of(item.period_s)]
-    converted = f", or turn it into PGV with convert {' or '.join(also)}" if also else ""
-    advice = f"give a curve of one of {ANSWERED}{converted}"
-    return f"{curve.source}: no model reads {curve.imt} alone: {advice}"
+class RateKeywords(BlockKeywords[V], CurveKeywords, AnsweringFields, total=False):
+    """Keywords of blocks, hazard curves and models for annual rates."""
 
 
-def describe_ends(
-    curves: Sequence[HazardCurve],
-    site: NDArray[np.intp],
-    rate: FloatArray,
-    above: FloatArray,
-    above_at_most: FloatArray,
-    below: FloatArray,
-) -> Iterator[str]:
-    """Yield warnings where shaking beyond the ends of curves may matter; the worst case is named.
+class ModelPart(NamedTuple):
+    """Blocks of one model.
 
     Args:
-        curves: the curve of each site.
-        site: index of each block's site, shape (m,).
-        rate: rates of failure [1/a], shape (m,); NaN of blocks that cannot be used.
-        above: part from beyond the last level, at least [1/a], shape (m,).
-        above_at_most: the same at most.
-        below: probability of failure at the first level, shape (m,).
+        indices: where they stand among all, shape (m,).
+        numbers: what the model reads of them, by field, shape (m,) each.
     """
-    more = above_at_most - above
-    of_block = " of a block" if rate.size > 1 else ""
-    for doubtful, size in ((more > NOTABLE * rate, more), (below > NOTABLE, below)):
-        if not doubtful.any():
+
+    indices: NDArray[np.intp]
+    numbers: Mapping[str, FloatArray]
+    model: FragilityModel
+
+
+def parts_by_model(
+    inputs: Mapping[str, Any], shaking: HazardLevel, answering: AnsweringFields
+) -> tuple[list[ModelPart], tuple[str, ...], NDArray[np.object_]]:
+    """Return the blocks grouped by model.
+
+    Returns:
+        The parts, warnings about the blocks, and of each why it cannot be used, empty for
+        those that can.
+
+    Raises:
+        InputError: blocks that are described twice or in part, or are of one kind without a model.
+        UnknownModelError: no model of that name, or of the one kind that there is.
+    """
+    blocks, size = blocks_of_arrays(inputs)
+    reason = block_reasons_of(blocks, size)
+    parts = []
+    for group in blocks.groups:
+        indices = np.arange(size) if group.indices is None else group.indices
+        try:
+            chosen = model_for(answering, (*group.numbers, shaking.name), group.kind)
+        except (InputError, UnknownModelError) as error:
+            if len(blocks.groups) == 1:
+                raise
+            reason[indices] = np.where(reason[indices] == "", str(error), reason[indices])
             continue
-        worst = int(np.argmax(np.where(doubtful, size, -1.0)))
-        curve, sites = curves[site[worst]], np.unique(site[doubtful]).size
-        of_site = f" of {curve.place}" if len(curves) > 1 and curve.place else ""
-        more_sites = f" (and {sites - 1:,} more of {len(curves):,} sites)" if sites > 1 else ""
-        if size is more:
-            yield Diagnostic(
-                f"the hazard curve{of_site} ends at {curve.level_text(-1)}: stronger shaking may "
-                f"add up to {annual_rate(float(more[worst]))} /yr to the rate{of_block}"
-                f"{more_sites}",
-                "curve_ends",
-            )
-        else:
-            yield Diagnostic(
-                f"the hazard curve{of_site} begins at {curve.level_text(0)}, where "
-                f"P(failure){of_block} is already {percent(float(below[worst]))}: weaker shaking "
-                f"is neglected (unconservative){more_sites}",
-                "curve_ends",
-            )
+        accepted = np.flatnonzero(reason[indices] == "")
+        if accepted.size:
+            values = {
+                n: np.broadcast_to(v, indices.shape)[accepted] for n, v in group.numbers.items()
+            }
+            # a block may fail at a PGA below the range of the disaggregation
+            start = shaking.magnitudes_from_g
+            weakest = float(values[chosen.method.block.strength].min())
+            if start is not None and start > weakest:
+                raise InputError(
+                    "Disaggregation levels must start at or below k_r: they, or those of the "
+                    f"curve, start at {start:.3g} g, and a block fails from {weakest:.3g} g on: "
+                    "disaggregate at higher probabilities, too (poes_disagg)",
+                    fields=("disaggregation",),
+                )
+            parts.append(ModelPart(indices[accepted], values, chosen))
+    return parts, blocks.remarks, reason

@@ -1,28 +1,34 @@
-"""Blocks of one site, and the annual rate of any failure by dependence model.
+"""Blocks of one site, the annual rate of any failure by dependence model, and their survival.
 
-Blocks may be uncertain: draws of their parameters, with weights, each make a set of blocks.
+Blocks may be uncertain: draws of their parameters, with weights, each make a set of blocks. The
+probability of survival is
+
+    S(f) = E[exp(-f λ T)]
+
+with λ the rate at which any of the blocks fails, T the age and f a factor on all hazard rates.
+Everything is done on ln S, which stays finite where S itself is 0 for a computer.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
+from scipy.optimize import brentq
+from scipy.special import logsumexp
 
 from rbfrag.errors import InputError
-from rbfrag.fragility.dependence import Dependence
-from rbfrag.fragility.invalid_rows import reject_elements
 from rbfrag.fragility.joint import UNKNOWN, Placement, any_fails
-from rbfrag.fragility.joint_sampling import JointSampler
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.fragility.uncertain import normal_product, normal_steps
-from rbfrag.hazards.annual_rate import Fragility, failure_rate
-from rbfrag.hazards.curve import HazardCurve
-from rbfrag.hazards.group_by_model import parts_by_model
-from rbfrag.hazards.joint_thresholds import joint_rates
-from rbfrag.hazards.rate_density import SiteMass, curve_mass
+from rbfrag.fragility.validation import reject_elements
+from rbfrag.hazards.curve import HazardCurve, describe_ends
+from rbfrag.hazards.joint_rate import COPULA, DEPENDENT, INDEPENDENT, joint_rates
+from rbfrag.hazards.rate_density import Grid, SiteMass, curve_mass, under
 from rbfrag.hazards.rate_integration import (
     KernelBlocks,
     Rates,
@@ -31,13 +37,195 @@ from rbfrag.hazards.rate_integration import (
     probabilities,
     rates,
 )
-from rbfrag.hazards.shaking import HazardLevel, describe_ends
+from rbfrag.hazards.shaking import HazardLevel, parts_by_model
 from rbfrag.question.fields import AnsweringFields
 from rbfrag.question.keywords import LEVEL
 from rbfrag.results.diagnostic import Diagnostic
 from rbfrag.solver.results import FloatArray
 from rbfrag.solver.scatter import fraction, lognormal
 from rbfrag.vocabulary.quantities import BLOCK, NUMBERS
+
+Fragility = Callable[[FloatArray], FloatArray]
+"""From levels of the curve's measure, shape (n,), to probabilities of failure, shape (m, n)."""
+
+STEP = 5e-4
+"""Step of ln(level): where a fragility jumps, its rate is right to half of it times the slope of
+the curve."""
+
+
+@dataclass(frozen=True, eq=False)
+class FailureRate:
+    """Annual failure rates of m fragility functions, and what lies beyond the ends of the curve.
+
+    Args:
+        annual_rate: rates [1/a], shape (m,).
+        above: rate that shaking beyond the last level of the curve adds at least [1/a],
+            shape (m,); part of `annual_rate`.
+        above_at_most: the same at most; the difference is not in `annual_rate`.
+        below: probability of failure at the lowest level of the curve, shape (m,).
+    """
+
+    annual_rate: FloatArray
+    above: FloatArray
+    above_at_most: FloatArray
+    below: FloatArray
+
+
+def failure_rate(curve: HazardCurve, fragility: Fragility) -> FailureRate:
+    """Return the annual rate of failure, the integral of P(failure | x) over -dλ(x).
+
+    Shaking beyond the last level counts with the probability at that level, the least it can be;
+    below the first level nothing is counted.
+
+    Args:
+        fragility: probabilities of failure at levels of its measure; rows are blocks.
+
+    Raises:
+        InputError: a probability is not a number.
+    """
+    first, last = curve.levels[[0, -1]].tolist()
+    grid = Grid.over(STEP, np.log(first), np.log(last))
+    p = _checked(fragility, np.clip(np.exp(grid.u), first, last))
+    ends = _checked(fragility, np.array([first, last]))
+    rate = float(curve.annual_rate[-1])
+    beyond = np.ones(ends.shape[0])
+    if curve.end_level is not None:
+        beyond = _checked(fragility, np.array([curve.end_level]))[:, 0]
+    return FailureRate(p @ under([curve], grid)[0], rate * ends[:, 1], rate * beyond, ends[:, 0])
+
+
+def _checked(fragility: Fragility, levels: FloatArray) -> FloatArray:
+    probabilities = np.atleast_2d(np.asarray(fragility(levels), dtype=np.float64))
+    if np.isnan(probabilities).any():
+        level = float(levels[np.argwhere(np.isnan(probabilities))[0][1]])
+        raise InputError(f"the probability of failure at the level {level:g} is not a number")
+    return probabilities
+
+
+_AGES = 401
+_REACH = 10.0
+"""Points of the law of the age, and how far they reach in standard deviations of ln T: survival
+of a high rate is decided in the far lower tail."""
+
+_DOUBLINGS = 1000
+
+
+@dataclass(frozen=True, eq=False)
+class Age:
+    """Age of standing blocks: a lognormal distribution with given mean and standard deviation.
+
+    Lognormal rather than normal and cut at zero: an exposure age is a concentration over a
+    production rate, whose errors multiply; and a normal law gives weight to rocks that have stood
+    for no time at all, which is all that would be left of the survival of a high rate.
+
+    Args:
+        years: ages [a], shape (q,).
+        weight: their weights, which sum to 1, shape (q,).
+    """
+
+    years: FloatArray
+    weight: FloatArray
+
+    @classmethod
+    def of(cls, mean: float, sd: float = 0.0) -> Age:
+        """Return the lognormal distribution of an age.
+
+        Args:
+            mean: mean age [a], above 0.
+            sd: its standard deviation [a], 0 for an age that is known.
+
+        Raises:
+            InputError: the age is not above 0, or its standard deviation is below 0.
+        """
+        if not (math.isfinite(mean) and mean > 0.0):
+            raise InputError(f"age = {mean:g} years: give the age of the blocks, above 0")
+        if not (math.isfinite(sd) and sd >= 0.0):
+            raise InputError(f"standard deviation of the age = {sd:g} years: give 0 or more")
+        if sd == 0.0:
+            return cls(np.array([mean]), np.ones(1))
+        variance = math.log1p((sd / mean) ** 2)
+        z, weight = normal_steps(_AGES, _REACH)
+        return cls(mean * np.exp(math.sqrt(variance) * z - 0.5 * variance), weight)
+
+
+@dataclass(frozen=True, eq=False)
+class Standing:
+    """Survival as a mixture over rates and ages.
+
+    Args:
+        failures: expected number of failures λT at the hazard as given, shape (n,).
+        log_weight: logarithms of the weights, which sum to 1, shape (n,).
+    """
+
+    failures: FloatArray
+    log_weight: FloatArray
+
+    @classmethod
+    def of(cls, annual_rate: ArrayLike, weight: ArrayLike, age: Age) -> Standing:
+        """Return the survival for a discrete distribution of rates.
+
+        Args:
+            annual_rate: rates at which any block fails [1/a], shape (k,).
+            weight: their probabilities, shape (k,).
+        """
+        failures = np.multiply.outer(np.asarray(annual_rate, dtype=np.float64), age.years)
+        with np.errstate(divide="ignore"):
+            log_weight = np.log(np.multiply.outer(np.asarray(weight), age.weight))
+        return cls(failures.ravel(), log_weight.ravel())
+
+    @classmethod
+    def mixed(cls, parts: list[Standing], weight: ArrayLike) -> Standing:
+        """Return the survival as a mixture over several hazards with given probabilities."""
+        with np.errstate(divide="ignore"):
+            logs = np.log(np.asarray(weight, dtype=np.float64))
+        return cls(
+            np.concatenate([part.failures for part in parts]),
+            np.concatenate([part.log_weight + w for part, w in zip(parts, logs, strict=True)]),
+        )
+
+    def log_probability(self, factor: float = 1.0) -> float:
+        """Return ln of the survival probability for all hazard rates times a factor."""
+        return float(logsumexp(self.log_weight - factor * self.failures))
+
+    @property
+    def probability(self) -> float:
+        """Probability that all blocks stand after the age."""
+        return min(math.exp(self.log_probability()), 1.0)
+
+    def factor(self, probability: float) -> float | None:
+        """Return the factor on the hazard rates that gives a survival probability.
+
+        None where no factor makes survival so improbable: nothing fails, or may fail, ever.
+        """
+        target = math.log(probability)
+        never = self.log_weight[self.failures == 0.0]
+        if never.size and logsumexp(never) >= target:
+            return None
+        # S(f) >= exp(-f E[λT]) by Jensen: the factor is at least -ln(probability)/E[λT]
+        low = -target / float(np.exp(self.log_weight) @ self.failures)
+        high = low
+        for _ in range(_DOUBLINGS):
+            if self.log_probability(high) <= target:
+                break
+            low, high = high, 2.0 * high
+        if high == low:
+            return high
+        return float(
+            brentq(lambda f: self.log_probability(f) - target, low, high, rtol=1e-12, xtol=1e-300)
+        )
+
+
+def weights_given_standing(parts: list[Standing], weight: ArrayLike) -> FloatArray:
+    """Return the posterior weights of hazards given that all blocks stand (Bayes): w S/Σ w S.
+
+    Args:
+        weight: their weights before, which sum to 1, shape (n,).
+    """
+    with np.errstate(divide="ignore"):
+        logs = np.log(np.asarray(weight, dtype=np.float64))
+    logs = logs + np.array([part.log_probability() for part in parts])
+    return np.asarray(np.exp(logs - logsumexp(logs)))
+
 
 ALL_STAND = "that all of them stand is the question"
 """Why blocks of which one cannot be used are rejected."""
@@ -47,30 +235,6 @@ _ALWAYS = 2
 """Size and strength have their points even where certain: what else scatters does not move them."""
 
 ONE_BLOCK = "one block"
-COPULA = "the model's copula"
-INDEPENDENT = "independent"
-DEPENDENT = "fully dependent"
-
-Normals = Callable[[int, np.random.Generator], FloatArray]
-"""Draws standard normals of some blocks, shape (draws, n)."""
-
-
-def normals_by_law(law: Dependence | None, where: Placement | None, n: int) -> dict[str, Normals]:
-    """Return samplers of the standard normals of n blocks in one earthquake, by dependence model.
-
-    Args:
-        law: the copula; None where it is not known, which leaves the bounds.
-        where: the blocks; None where they have no size.
-        n: their number.
-    """
-    if law is not None and where is not None:
-        return {COPULA: JointSampler(law, where).normals}
-    return {
-        DEPENDENT: lambda draws, generator: np.broadcast_to(
-            generator.standard_normal((draws, 1)), (draws, n)
-        ),
-        INDEPENDENT: lambda draws, generator: generator.standard_normal((draws, n)),
-    }
 
 
 @dataclass(frozen=True, eq=False)

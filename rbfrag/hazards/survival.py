@@ -12,22 +12,21 @@ from numpy.typing import ArrayLike
 
 from rbfrag.errors import InputError
 from rbfrag.fragility import describe
-from rbfrag.hazards.annual_rate import Fragility
-from rbfrag.hazards.branches import Weights, branch_curves, curve_name, quantile_warning
-from rbfrag.hazards.curve import CurveKeywords, HazardCurve
+from rbfrag.hazards.branches import Weights, branch_curves, curve_name, curve_warnings
+from rbfrag.hazards.curve import NOTABLE, NOTABLE_FACTOR, CurveKeywords, HazardCurve, is_truncated
 from rbfrag.hazards.curve_file import CurveLike
-from rbfrag.hazards.group_by_model import RateKeywords
-from rbfrag.hazards.hazard_answer import NOTABLE_FACTOR, is_truncated
-from rbfrag.hazards.shaking import NOTABLE, HazardLevel
+from rbfrag.hazards.joint_rate import DEPENDENT, INDEPENDENT
+from rbfrag.hazards.shaking import HazardLevel, RateKeywords
 from rbfrag.hazards.standing_blocks import (
-    DEPENDENT,
-    INDEPENDENT,
+    Age,
     AnyRate,
+    Fragility,
     FragilityBlocks,
     ModelBlocks,
+    Standing,
     StandingBlocks,
+    weights_given_standing,
 )
-from rbfrag.hazards.survival_probability import Age, Standing, weights_given_standing
 from rbfrag.question.keywords import LEVEL, parts_of
 from rbfrag.results.diagnostic import Diagnostic
 from rbfrag.results.numbers import (
@@ -44,7 +43,7 @@ from rbfrag.results.numbers import (
 )
 from rbfrag.results.result import Result, TextLine, TextTable
 from rbfrag.solver.kinds import by_model, mode_of_kind
-from rbfrag.solver.results import FloatArray
+from rbfrag.solver.quantity import finite_or_none
 from rbfrag.vocabulary.quantities import ANSWERING, BLOCKS
 
 DRAWS = 128
@@ -192,28 +191,23 @@ class SurvivalAnswer(Result):
             is_range = least >= SMALLEST or value[0] == "<"
             p = equals(event, ends) if is_range else f"{event} at most {value}"
             yield f"{p}: {self.curve_end}"
-            yield f"Return period of {failure} {self._return_period_range()}"
+            bound = rate + self.annual_rate_beyond
+            period = f"between {years(bound)} and {return_period(rate)}"
+            if math.isinf(bound):
+                period = f"at most {return_period(rate)}"
+            elif not rate > NEVER:
+                period = f"at least {return_period(bound)}"
+            yield f"Return period of {failure} {period}"
         else:
             ends = interval(self.ci_low, self.ci_high)
             level = f"   ({confidence(self.level, ends)})" if ends != value else ""
             yield f"{equals(event, value)}{level}"
             yield f"Return period of {failure} {return_period(rate)}"
-        yield f"{self._curve()} {self._test()}"
-
-    def _return_period_range(self) -> str:
-        """Return the range of the return period, "between 1,600 and 3,200 years"."""
-        rate, bound = self.annual_rate_any, self.annual_rate_any + self.annual_rate_beyond
-        if math.isinf(bound):
-            return f"at most {return_period(rate)}"
-        if rate > NEVER:
-            return f"between {years(bound)} and {return_period(rate)}"
-        return f"at least {return_period(bound)}"
-
-    def _curve(self) -> str:
-        if len(self.branches) == 1:
-            return "The hazard curve"
-        weighted = self.branches[0].name != self.hazard
-        return f"The hazard of {self.hazard}" if weighted else f"The hazard curve {self.hazard}"
+        curve = "The hazard curve"
+        if len(self.branches) > 1:  # of the first curve, or of weighted branches
+            first = "hazard curve" if self.branches[0].name == self.hazard else "hazard of"
+            curve = f"The {first} {self.hazard}"
+        yield f"{curve} {self._test()}"
 
     def _test(self) -> str:
         """Return the outcome of the test at the 5 % level; undecided if the interval has 5 %."""
@@ -326,7 +320,7 @@ def survival(
             branches.
         numbers: p2 [1/s²] and kr of the blocks, medians, if they are not given by name.
         age_years: how long the blocks have stood in this position [a], the mean of a lognormal
-            law (:class:`rbfrag.hazards.survival_probability.Age`).
+            law (:class:`rbfrag.hazards.standing_blocks.Age`).
         age_sd_years: its standard deviation [a].
         weights: as in :func:`rbfrag.hazard`.
         fragility: instead of blocks, a function from levels of the curves' measure, shape (n,), to
@@ -365,31 +359,64 @@ def survival(
     else:
         raise InputError("fragility describes the blocks: omit p2 and kr")
     rates = [blocks.rate(curve) for curve in site_curves]
-    result = _Survival(rates, blocks.weight, age, weight)
+    branch_weight = None if weight is None else np.nan_to_num(weight)
+
+    def under_each(law: int = 0, band: int = 0) -> list[Standing]:
+        """Return the survival under each curve, by dependence model and end of the interval."""
+        return [Standing.of(rate.annual_rate[law, :, band], blocks.weight, age) for rate in rates]
+
+    def over_branches(law: int = 0, band: int = 0) -> Standing:
+        """Return the survival over all branches, or under the first curve without weights."""
+        parts = under_each(law, band)
+        return parts[0] if branch_weight is None else Standing.mixed(parts, branch_weight)
+
     bands = rates[0].annual_rate.shape[2]
-    middle, least, most = (result.mixture(band=band % bands) for band in (0, 2, 1))
+    middle, least, most = (over_branches(band=band % bands) for band in (0, 2, 1))
     law_index = {
         name: blocks.laws.index(name) for name in (INDEPENDENT, DEPENDENT) if blocks.count > 1
     }
-    used = slice(1) if weight is None else slice(None)
-    beyond, end = _beyond(site_curves[used], rates[used])
+    # the most that shaking beyond the levels of a curve that answers adds to the rate
+    used = list(zip(site_curves, rates, strict=True))[: 1 if branch_weight is None else None]
+    curve, rate = max(used, key=lambda pair: pair[1].beyond)
+    beyond, end = rate.beyond, f"the hazard curve ends at {curve.level_text(-1)}"
+    for curve, rate in used:
+        if rate.below > NOTABLE:
+            beyond, end = math.inf, f"the hazard curve begins at {curve.level_text(0)}"
+            break
+    parts = under_each()
+    before: tuple[float | None, ...] = (None,) * len(parts)
+    after = before
+    if weight is not None and branch_weight is not None:
+        posterior = weights_given_standing(parts, branch_weight)
+        before, after = (
+            tuple(map(finite_or_none, np.where(np.isnan(weight), np.nan, values).tolist()))
+            for values in (weight, posterior)
+        )
+    branches = tuple(
+        BranchSurvival(
+            name=curve_name(curve), weight=before[i], weight_given_standing=after[i],
+            annual_rate_any=rates[i].mean, **_numbers(parts[i]), standing=parts[i],
+        )
+        for i, curve in enumerate(site_curves)
+    )  # fmt: skip
+    means = [rate.mean for rate in rates]
     return SurvivalAnswer(
         **_numbers(middle),
         ci_low=least.probability,
         ci_high=most.probability,
         factor_5_percent_ci=(least.factor(0.05), most.factor(0.05)),
         factor_50_percent_ci=(least.factor(0.5), most.factor(0.5)),
-        annual_rate_any=result.annual_rate,
+        annual_rate_any=means[0] if branch_weight is None else float(branch_weight @ means),
         age_years=float(age_years),
         age_sd_years=float(age_sd_years),
         blocks=blocks.count,
         hazard=curve_name(site_curves[0]) if weight is None else "the weighted branches",
         joint_law=blocks.laws[0],
         bounds={
-            name.replace(" ", "_"): _numbers(result.mixture(law)) for name, law in law_index.items()
+            name.replace(" ", "_"): _numbers(over_branches(law)) for name, law in law_index.items()
         }
         or None,
-        branches=result.branches(site_curves),
+        branches=branches,
         kind=None if model_blocks is None else model_blocks.model.kind,
         model=None if model_blocks is None else model_blocks.model.name,
         term=None if model_blocks is None else model_blocks.model.term.name,
@@ -402,20 +429,6 @@ def survival(
         annual_rate_beyond=beyond,
         curve_end=end,
     )
-
-
-def _beyond(curves: Sequence[HazardCurve], rates: Sequence[AnyRate]) -> tuple[float, str]:
-    """Return the most that shaking beyond the levels of a curve adds to a rate, and the level.
-
-    Args:
-        curves: the curves that the answer is of.
-        rates: rates of any failure under each.
-    """
-    for curve, rate in zip(curves, rates, strict=True):
-        if rate.below > NOTABLE:
-            return math.inf, f"the hazard curve begins at {curve.level_text(0)}"
-    curve, rate = max(zip(curves, rates, strict=True), key=lambda pair: pair[1].beyond)
-    return rate.beyond, f"the hazard curve ends at {curve.level_text(-1)}"
 
 
 def require_kind(inputs: Mapping[str, Any]) -> None:
@@ -437,70 +450,11 @@ KIND_MISSING = (
 )
 
 
-@dataclass(frozen=True, eq=False)
-class _Survival:
-    """Survival of the blocks under several hazard curves.
-
-    Args:
-        rates: how often any block fails under each.
-        draw_weight: weights of the draws of the blocks, shape (k,).
-        age: how long they have stood.
-        weight: weight of each curve, NaN for one that is no branch; None where none is.
-    """
-
-    rates: list[AnyRate]
-    draw_weight: FloatArray
-    age: Age
-    weight: FloatArray | None
-
-    def parts(self, law: int = 0, band: int = 0) -> list[Standing]:
-        """Return the survival under each curve, by dependence model and end of the interval."""
-        return [
-            Standing.of(rate.annual_rate[law, :, band], self.draw_weight, self.age)
-            for rate in self.rates
-        ]
-
-    def mixture(self, law: int = 0, band: int = 0) -> Standing:
-        """Return the survival over all branches, or under the first curve without weights."""
-        parts = self.parts(law, band)
-        return (
-            parts[0] if self.weight is None else Standing.mixed(parts, np.nan_to_num(self.weight))
-        )
-
-    @property
-    def annual_rate(self) -> float:
-        """Annual rate of any failure [1/a], weighted over the branches."""
-        rates = [rate.mean for rate in self.rates]
-        return rates[0] if self.weight is None else float(np.nan_to_num(self.weight) @ rates)
-
-    def branches(self, curves: list[HazardCurve]) -> tuple[BranchSurvival, ...]:
-        """Return the answer for each curve."""
-        parts, n = self.parts(), len(curves)
-        before: list[float | None] = [None] * n
-        after: list[float | None] = [None] * n
-        if self.weight is not None:
-            posterior = weights_given_standing(parts, np.nan_to_num(self.weight))
-            for i in np.flatnonzero(~np.isnan(self.weight)).tolist():
-                before[i], after[i] = float(self.weight[i]), float(posterior[i])
-        return tuple(
-            BranchSurvival(
-                name=curve_name(curve),
-                weight=before[i],
-                weight_given_standing=after[i],
-                annual_rate_any=self.rates[i].mean,
-                **_numbers(parts[i]),
-                standing=parts[i],
-            )
-            for i, curve in enumerate(curves)
-        )
-
-
 def _warnings(
     curves: list[HazardCurve], rates: list[AnyRate], blocks: StandingBlocks
 ) -> Iterator[str]:
     for curve in curves:
-        yield from curve.warnings
-        yield from quantile_warning(curve, "survival")
+        yield from curve_warnings(curve, "survival")
     yield from blocks.warnings
     for rate in rates:
         yield from rate.warnings

@@ -12,6 +12,7 @@ from sqlalchemy import Connection
 from rbfrag.db.connect import unchecked_engine
 from rbfrag.db.location import VERSION_TABLE, locate
 from rbfrag.db.schema import metadata
+from rbfrag.db.views import create_views, drop_views
 
 
 def _run(connection: Connection) -> None:
@@ -25,7 +26,9 @@ def _run(connection: Connection) -> None:
         transactional_ddl=True,
     )
     with context.begin_transaction():
+        drop_views(connection)  # a table that a view reads cannot be rebuilt
         context.run_migrations()
+        create_views(connection)
 
 
 _shared: Connection | None = context.config.attributes.get("connection")

@@ -17,10 +17,14 @@ from typing import BinaryIO
 
 from rbfrag.errors import MotionFileError
 from rbfrag.files import packed_as
-from rbfrag.motions.text.file import LARGEST_FILE_BYTES
+from rbfrag.motions.text import LARGEST_FILE_BYTES
 
-DOCUMENTS = frozenset({".md", ".rst", ".pdf", ".htm", ".html", ".doc", ".docx"})
-"""Endings of files about records: passed over among others, read when named."""
+DOCUMENTS = frozenset({".md", ".rst", ".pdf", ".htm", ".html", ".doc", ".docx", ".xml"})
+"""Endings of files about records, StationXML among them: passed over among others, read when
+named."""
+
+_OFFICE_PART = "[Content_Types].xml"
+"""Member of every workbook and document of an office program."""
 
 LARGEST_RATIO = 200
 """Text of numbers shrinks to a third or a tenth, zeros to a hundredth."""
@@ -67,7 +71,7 @@ def is_there(path: Path) -> bool:
 def records_among(files: Iterable[Path]) -> list[Path]:
     """Return the record files of a folder or zip, sorted.
 
-    Hidden files are not, nor texts about records, nor the spectra (V3) of a record (V2) beside
+    Hidden files are not, nor texts about records, nor the spectra (V3) of a record (V2) next to
     them.
     """
     files = list(files)
@@ -92,6 +96,10 @@ def members_of(archive: Path) -> list[Path]:
         MotionFileError: it is damaged, too large, or holds none.
     """
     with _opened(archive) as members:
+        if _OFFICE_PART in members:
+            raise MotionFileError(
+                archive, "this is a workbook or document, not a record: save the sheet as CSV"
+            )
         total = sum(info.file_size for info in members.values())
         records = records_among(archive / name for name in members)
     if total > LARGEST_FILE_BYTES:

@@ -31,7 +31,7 @@ _COMPASS = {
     **dict.fromkeys(("S", "SOUTH", "SUR", "SUL", "SUD", "GUNEY"), 180.0),
     **dict.fromkeys(("W", "WEST", "OESTE", "OVEST", "OUEST", "BATI"), 270.0),
 }
-"""Azimuth [deg] of words, and of axes, whose positive end is taken to be north or east."""
+"""Azimuth [deg] of words, and of axes, whose positive end is assumed to be north or east."""
 
 HORIZONTAL_NAMES = frozenset(
     {"H1", "H2", "L", "T", "X", "Y", "LN", "TR", "LONG", "LONGITUDINAL", "TRAN", "TRANS",
@@ -170,37 +170,38 @@ def why_not_together(
     dt_s: tuple[float | None, float | None],
     start_time: tuple[datetime | None, datetime | None],
     lead_in_samples: tuple[int, int],
+    names: tuple[str, str] = ("the horizontal", "the vertical component"),
 ) -> str:
-    """Return the reason why a horizontal and a vertical motion do not match; empty if they do.
+    """Return the reason why two components of a recording do not match; empty if they do.
 
     Different lengths are no reason: the ground of the shorter one is at rest after its end.
 
     Args:
-        dt_s: sampling intervals of the horizontal and the vertical [s].
+        dt_s: sampling intervals of the two components [s].
         start_time: times of their first samples by the clock of their files, where known.
         lead_in_samples: zeros that processing put before the first sample of the file.
+        names: the two components in the reason.
     """
     if dt_s[0] is None or dt_s[1] is None:
         # motions from nodes carry their times themselves; the solver compares those
         return ""
     if dt_s[0] != dt_s[1]:
         return (
-            f"the vertical component has dt = {dt_s[1]:g} s, the horizontal {dt_s[0]:g} s: bring "
-            "both to one sampling interval first"
+            f"{names[1]} has dt = {dt_s[1]:g} s, {names[0]} {dt_s[0]:g} s: bring both to one "
+            "sampling interval first"
         )
     if lead_in_samples[0] != lead_in_samples[1]:
         return (
-            f"processing put {lead_in_samples[0]} samples before the horizontal component and "
-            f"{lead_in_samples[1]} before the vertical: process both alike, or neither"
+            f"processing put {lead_in_samples[0]} samples before {names[0]} and "
+            f"{lead_in_samples[1]} before {names[1]}: process both alike, or neither"
         )
     first, second = start_time
     if first is not None and second is not None:
         late_s = (second - first).total_seconds()
         if abs(late_s) > SAME_START * dt_s[0]:
             return (
-                f"the vertical component starts {abs(late_s):g} s "
-                f"{'after' if late_s > 0.0 else 'before'} the horizontal, as their headers say: "
-                "cut both to a common start first"
+                f"{names[1]} starts {abs(late_s):g} s {'after' if late_s > 0.0 else 'before'} "
+                f"{names[0]}, as their headers say: cut both to a common start first"
             )
     return ""
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime
 from functools import cached_property
@@ -181,9 +181,38 @@ class GroundMotion:
         return intensity.intensity_measures(self.acceleration_g, self.interval_s, self.dt_s)
 
     @cached_property
+    def _ordinates(self) -> dict[float, float]:
+        return {}
+
+    def spectral_acceleration(self, period_s: float) -> float:
+        """Return the spectral acceleration at 5 % damping [g], computed once for each period."""
+        return self._spectrum((period_s,))[0]
+
+    def _spectrum(self, periods_s: Iterable[float]) -> tuple[float, ...]:
+        periods_s = tuple(periods_s)
+        if missing := [period_s for period_s in periods_s if period_s not in self._ordinates]:
+            ordinates = response_spectrum.spectral_accelerations(
+                self.acceleration_g, self.interval_s, missing
+            )
+            self._ordinates.update(zip(missing, ordinates, strict=True))
+        return tuple(self._ordinates[period_s] for period_s in periods_s)
+
+    @property
     def spectral_accelerations(self) -> Mapping[str, float]:
         """Spectral accelerations at 5 % damping [g] by name, ``sa03_g`` for that at 0.3 s."""
-        return response_spectrum.spectral_accelerations(self.acceleration_g, self.interval_s)
+        periods = response_spectrum.PERIODS_S
+        return dict(zip(periods, self._spectrum(periods.values()), strict=True))
+
+    @property
+    def spectrum_g(self) -> tuple[float, ...]:
+        """Response spectrum at 5 % damping [g], at the periods `SPECTRUM_PERIODS_S`."""
+        return self._spectrum(response_spectrum.SPECTRUM_PERIODS_S)
+
+    @cached_property
+    def housner_m(self) -> float:
+        """Housner intensity, the integral of PSV from 0.1 to 2.5 s at 5 % damping [m]."""
+        ordinates_g = self._spectrum(response_spectrum.HOUSNER_PERIODS_S)
+        return response_spectrum.housner_intensity(ordinates_g)
 
     @property
     def pga_g(self) -> float:

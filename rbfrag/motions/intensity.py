@@ -1,4 +1,4 @@
-"""Intensity measures of an accelerogram that is linear between its samples.
+"""Intensity measures of a record that is linear between its samples.
 
 Velocity and displacement are the exact integrals of that record, started from rest, with
 no detrending: PGV and PGD are the extremes of those integrals, inside intervals as well as
@@ -43,7 +43,8 @@ class IntensityMeasures:
         final_displacement_m: displacement at the last sample [m].
         cav_m_s: cumulative absolute velocity, ∫|a| dt [m/s].
         arias_m_s: Arias intensity, π/(2 g) ∫a² dt [m/s].
-        d5_95_s: significant duration, from 5 to 95 % of ∫a² dt [s]; None where that is zero.
+        d5_75_s: significant duration, from 5 to 75 % of ∫a² dt [s]; None where that is zero.
+        d5_95_s: likewise from 5 to 95 %.
     """
 
     pga_g: float
@@ -54,6 +55,7 @@ class IntensityMeasures:
     final_displacement_m: float
     cav_m_s: float
     arias_m_s: float
+    d5_75_s: float | None
     d5_95_s: float | None
 
 
@@ -82,7 +84,8 @@ def intensity_measures(
         final_displacement_m=scale * float(displacement[-1]),
         cav_m_s=scale * cumulative_absolute_velocity(scaled, interval_s),
         arias_m_s=scale * scale * 0.5 * math.pi * STANDARD_GRAVITY_M_S2 * float(energy[-1]),
-        d5_95_s=significant_duration(scaled, interval_s, energy),
+        d5_75_s=significant_duration(scaled, interval_s, energy, 0.75),
+        d5_95_s=significant_duration(scaled, interval_s, energy, 0.95),
     )
     if not all(map(math.isfinite, (measures.pgv_m_s, measures.pgd_m, measures.arias_m_s))):
         raise InputError(
@@ -130,15 +133,16 @@ def running_energy(acceleration_g: FloatArray, interval_s: FloatArray) -> FloatA
 
 
 def significant_duration(
-    acceleration_g: FloatArray, interval_s: FloatArray, energy: FloatArray
+    acceleration_g: FloatArray, interval_s: FloatArray, energy: FloatArray, end: float
 ) -> float | None:
-    """Return D5-95 [s], the time in which ∫a² dt grows from 5 to 95 % of its end.
+    """Return D5-95 or D5-75 [s], the time in which ∫a² dt grows from 5 % to a fraction of its end.
 
-    (Trifunac & Brady 1975, Bull. Seism. Soc. Am. 65(3), 581-626), exact for a piecewise-linear
-    record.
+    (Trifunac & Brady 1975, Bull. Seism. Soc. Am. 65(3), 581-626; for 75 % Somerville et al. 1997,
+    Seism. Res. Lett. 68(1), 199-222), exact for a piecewise-linear record.
 
     Args:
-        energy: what :func:`running_energy` returned.
+        energy: ∫a² dt of :func:`running_energy` [g²·s], shape (n,).
+        end: fraction at which the duration ends: 0.95 or 0.75.
 
     Returns:
         The duration, or None where the ground never moves.
@@ -148,7 +152,7 @@ def significant_duration(
         return None
     times = _running_sum(interval_s)
     reached = []
-    for share in (0.05, 0.95):
+    for share in (0.05, end):
         threshold = share * total
         # the interval that ends above what is wanted and began at or below it
         at = int(np.searchsorted(energy, threshold, side="right")) - 1

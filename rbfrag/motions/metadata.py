@@ -7,27 +7,43 @@ import io
 import math
 import os
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from rbfrag.errors import InputError, MotionFileError, checked_name
 from rbfrag.motions.archive import archive_of
 from rbfrag.motions.processing import says_corrected
-from rbfrag.motions.text.file import read_text
+from rbfrag.motions.text import read_text
 from rbfrag.motions.units import acceleration_unit
+from rbfrag.vocabulary.quantities import MECHANISMS, QUANTITIES
+from rbfrag.vocabulary.quantity import Limits
 
 COLUMNS = (
     "file", "trace_index", "event_id", "units", "file_units", "is_vertical", "companion_group",
     "magnitude", "processing", "earthquake", "year", "station", "component", "dt_s", "gain",
+    "mechanism", "depth_km", "network", "lat", "lon", "rjb_km", "rrup_km", "repi_km", "vs30_m_s",
 )  # fmt: skip
-"""The columns that are read; only ``file`` must be there."""
+"""The columns with a meaning; only ``file`` must be there. Others become attributes."""
 
-OTHER_NAMES = {"unit": "units"}
+OF_EARTHQUAKE = ("mechanism", "depth_km")
+OF_RECORDING = ("network", "lat", "lon", "rjb_km", "rrup_km", "repi_km", "vs30_m_s")
+"""Columns that have one value for an earthquake, and one for a recording."""
+
+RANGES = {
+    **{name: QUANTITIES[name].range for name in ("depth_km", *OF_RECORDING[3:])},
+    "lat": Limits(least=-90.0, most=90.0),
+    "lon": Limits(least=-180.0, most=360.0),
+}
+
+OTHER_NAMES = {
+    "unit": "units", "vs30": "vs30_m_s", "rjb": "rjb_km", "rrup": "rrup_km", "repi": "repi_km",
+    "depth": "depth_km", "latitude": "lat", "longitude": "lon",
+}  # fmt: skip
 """Other names of columns."""
 
 _FEWEST_LETTERS, _MOST_EDITS = 6, 2
 
-NAMES = ("event_id", "companion_group", "earthquake", "station", "component")
+NAMES = ("event_id", "companion_group", "earthquake", "station", "component", "network")
 """Columns of names, whose length is bounded."""
 
 _TRUTH = {
@@ -56,6 +72,10 @@ class TraceMetadata:
         year: year or time of the earthquake, as text.
         dt_s: sampling interval [s].
         gain: counts/(m/s²) of a file in counts.
+        mechanism: fault mechanism.
+        depth_km: depth of the hypocentre [km].
+        site: columns of :data:`OF_RECORDING` that have a value.
+        attributes: texts of the further columns by name.
     """
 
     file: str
@@ -73,6 +93,10 @@ class TraceMetadata:
     component: str = ""
     dt_s: float | None = None
     gain: float | None = None
+    mechanism: str | None = None
+    depth_km: float | None = None
+    site: Mapping[str, object] = field(default_factory=dict)
+    attributes: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -81,7 +105,8 @@ class MotionMetadata:
 
     Args:
         rows: every row, in the table's order.
-        not_read: columns that are none of :data:`COLUMNS`.
+        not_read: further columns that differ between the components of a recording, which are no
+            attributes of it.
     """
 
     path: str
@@ -113,7 +138,11 @@ def read_metadata(path: str | os.PathLike[str]) -> MotionMetadata:
     Args:
         path: CSV with the columns of :data:`COLUMNS` (``file`` at least). Files are named
             relative to the folder of the CSV. A row without ``trace_index``
-            is about all traces of its file.
+            is about all traces of its file. Columns without a meaning are attributes of the
+            recording, unless its components differ in them.
+
+    Raises:
+        MotionFileError: a value out of its range, or several of one earthquake or recording.
     """
     table = Path(path)
     rows: list[TraceMetadata] = []
@@ -153,12 +182,56 @@ def read_metadata(path: str | os.PathLike[str]) -> MotionMetadata:
         by_file.setdefault(place, []).append(row)
     if header is None:
         raise MotionFileError(table, "the table is empty: give a header")
+    _reject_conflicts(table, rows)
+    not_read = _of_components(rows)
     by_place = {
-        place: tuple(sorted(traces, key=lambda row: row.trace_index or 0))
+        place: tuple(
+            replace(
+                row,
+                attributes={
+                    name: text for name, text in row.attributes.items() if name not in not_read
+                },
+            )
+            for row in sorted(traces, key=lambda row: row.trace_index or 0)
+        )
         for place, traces in by_file.items()
     }
-    not_read = tuple(name for name in header if name and name not in COLUMNS)
     return MotionMetadata(os.fspath(path), tuple(rows), not_read, by_place)
+
+
+def _reject_conflicts(table: Path, rows: list[TraceMetadata]) -> None:
+    """Reject several values of one earthquake, or of the components of one recording."""
+    first: dict[tuple[str, ...], tuple[object, int]] = {}
+    for row in rows:
+        event = {name: getattr(row, name) for name in OF_EARTHQUAKE}
+        facts: list[tuple[str, tuple[str, ...], dict[str, object]]]
+        facts = [(f"earthquake {row.event_id!r}", (row.event_id,), event)]
+        if group := row.companion_group:
+            facts.append((f"recording {group!r}", (row.event_id, group, row.station), {**row.site}))
+        for subject, key, values in facts:
+            for name, value in values.items():
+                if value is None:
+                    continue
+                before, line = first.setdefault((subject, *key, name), (value, row.line))
+                if before != value:
+                    raise MotionFileError(
+                        table,
+                        f"{name} of the {subject} is {value}, but {before} in line {line}: correct "
+                        "one of them",
+                        line=row.line,
+                    )
+
+
+def _of_components(rows: list[TraceMetadata]) -> tuple[str, ...]:
+    """Return the further columns in which components of one recording differ."""
+    seen: dict[tuple[str, ...], str] = {}
+    differing: dict[str, None] = {}
+    for row in rows:
+        for name, text in row.attributes.items():
+            key = (row.event_id, row.companion_group, row.station, name)
+            if row.companion_group and seen.setdefault(key, text) != text:
+                differing[name] = None
+    return tuple(differing)
 
 
 def _numbered_rows(table: Path) -> Iterator[tuple[int, list[str]]]:
@@ -188,16 +261,23 @@ def _header(table: Path, cells: list[str], line: int) -> list[str]:
         if header.count(name) > 1:
             raise MotionFileError(table, f"the column {name!r} occurs twice", line=line)
     for text in header:
-        if text in COLUMNS or sum(map(str.isalpha, text)) < _FEWEST_LETTERS:
+        if text in COLUMNS:
             continue
+        is_long = sum(map(str.isalpha, text)) >= _FEWEST_LETTERS
         for name in COLUMNS:
-            if _edits(text, name) <= _MOST_EDITS:
+            differs_in_marks = _letters(text) == _letters(name)
+            if differs_in_marks or (is_long and _edits(text, name) <= _MOST_EDITS):
                 raise MotionFileError(
                     table,
                     f"{text[:60]}: did you mean {name}? Rename the column",
                     line=line,
                 )
     return header
+
+
+def _letters(text: str) -> str:
+    """Return the letters and digits of a text, in small letters."""
+    return "".join(filter(str.isalnum, text.lower()))
 
 
 def _edits(first: str, second: str) -> int:
@@ -250,6 +330,17 @@ def _row(table: Path, fields: Mapping[str, str], line: int) -> TraceMetadata:
             acceleration_unit(text("units"))
     except InputError as error:
         raise MotionFileError(table, str(error), line=line) from None
+    for name in OF_EARTHQUAKE:
+        if text(name) and not text("event_id"):
+            raise MotionFileError(
+                table, f"{name} requires the event_id of the earthquake", line=line
+            )
+    mechanism = text("mechanism").lower().replace("_", "-").replace(" ", "-")
+    if mechanism and mechanism not in MECHANISMS:
+        names = " or ".join(MECHANISMS)
+        raise MotionFileError(table, f"mechanism {text('mechanism')!r} must be {names}", line=line)
+    ranged = {name: number(name, limits.holds, limits.words) for name, limits in RANGES.items()}
+    site = {"network": text("network"), **{name: ranged[name] for name in OF_RECORDING[1:]}}
     most = LARGEST_MAGNITUDE
     return TraceMetadata(
         line=line,
@@ -260,7 +351,13 @@ def _row(table: Path, fields: Mapping[str, str], line: int) -> TraceMetadata:
         year=text("year") or None,
         dt_s=number("dt_s", lambda value: value > 0.0, "a positive number of seconds"),
         gain=number("gain", lambda value: value > 0.0, "a positive number of counts/(m/s2)"),
-        **{name: text(name) for name in ("file", "processing", *NAMES)},
+        mechanism=mechanism or None,
+        depth_km=ranged["depth_km"],
+        site={name: value for name, value in site.items() if value not in (None, "")},
+        attributes={
+            name: value for name, value in fields.items() if name and value and name not in COLUMNS
+        },
+        **{name: text(name) for name in ("file", "processing", *NAMES[:-1])},
     )
 
 

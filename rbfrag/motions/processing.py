@@ -15,7 +15,6 @@ from dataclasses import asdict, dataclass, replace
 from datetime import timedelta
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rbfrag.errors import InputError
 from rbfrag.motions.ground_motion import GroundMotion
@@ -181,8 +180,18 @@ def processed(motion: GroundMotion, high_pass: HighPass = DEFAULT_HIGH_PASS) -> 
         raise InputError(
             f"{motion.label}: a PGA of {motion.pga_g:g} g cannot be filtered: check the unit"
         )
+    count = round(high_pass.taper_s / motion.dt_s)
+    if 2 * count > motion.npts:
+        raise InputError(
+            f"{motion.label}: a taper of {high_pass.taper_s:g} s at each end is longer than the "
+            f"record of {motion.duration_s:g} s"
+        )
+    weights = np.ones(motion.npts)
+    if count:
+        rise = 0.5 * (1.0 - np.cos(np.pi * np.arange(count) / count))
+        weights[:count], weights[-count:] = rise, rise[::-1]
     samples = motion.acceleration_g - motion.acceleration_g.mean()
-    samples = np.pad(samples * _taper(motion, high_pass.taper_s), padding)
+    samples = np.pad(samples * weights, padding)
     sections = butter(high_pass.order, high_pass.corner_hz, "highpass", fs=1.0 / motion.dt_s,
                       output="sos")  # fmt: skip
     try:
@@ -208,18 +217,3 @@ def processed(motion: GroundMotion, high_pass: HighPass = DEFAULT_HIGH_PASS) -> 
             "padding_samples": padding,
         },
     )
-
-
-def _taper(motion: GroundMotion, taper_s: float) -> NDArray[np.float64]:
-    assert motion.dt_s is not None
-    count = round(taper_s / motion.dt_s)
-    if 2 * count > motion.npts:
-        raise InputError(
-            f"{motion.label}: a taper of {taper_s:g} s at each end is longer than the record of "
-            f"{motion.duration_s:g} s"
-        )
-    weights = np.ones(motion.npts)
-    if count:
-        rise = 0.5 * (1.0 - np.cos(np.pi * np.arange(count) / count))
-        weights[:count], weights[-count:] = rise, rise[::-1]
-    return weights

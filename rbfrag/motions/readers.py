@@ -1,17 +1,17 @@
-"""Reading accelerograms: the format is identified by content, not by the file's name."""
+"""Reading of accelerograms, whose format is identified by content, and their export."""
 
 from __future__ import annotations
 
 import math
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
 from typing import Any, TypeAlias
 
 from rbfrag.errors import InputError, MissingExtraError, MotionFileError, UnknownFormatError
-from rbfrag.files import as_path
+from rbfrag.files import as_path, written_whole
 from rbfrag.motions.archive import archive_of, is_archive, member_bytes, members_of
 from rbfrag.motions.direction import azimuth_deg, bare_name, is_vertical_name
 from rbfrag.motions.formats import (
@@ -25,6 +25,7 @@ from rbfrag.motions.formats import (
     esm_asc,
     geonet_v2a,
     knet,
+    knet_csv,
     miniseed,
     nsmn,
     peer_at2,
@@ -36,10 +37,9 @@ from rbfrag.motions.formats import (
     usgs_smc,
 )
 from rbfrag.motions.ground_motion import GroundMotion
-from rbfrag.motions.text.file import cut_number, decoded, read_bytes
-from rbfrag.motions.text.header_check import agreed
-from rbfrag.motions.text.record_file import ParsedTrace, RecordFile
-from rbfrag.motions.text.times import first_sample_time
+from rbfrag.motions.header_check import agreed
+from rbfrag.motions.record_file import ParsedTrace, RecordFile
+from rbfrag.motions.text import cut_number, decoded, first_sample_time, read_bytes
 from rbfrag.motions.units import acceleration_unit
 
 MotionLike: TypeAlias = GroundMotion | str | os.PathLike[str]
@@ -54,6 +54,7 @@ READERS: tuple[ModuleType, ...] = (
     cdmg_v1,
     bhrc_v1,
     knet,
+    knet_csv,
     esm_asc,
     csmnc,
     scec_bbp,
@@ -82,6 +83,7 @@ def read_motions(
     dt_s: float | None = None,
     allow_partial: bool = False,
     gain: float | Mapping[int, float] | None = None,
+    channel: str | None = None,
 ) -> list[GroundMotion]:
     """Return every acceleration trace of a file, unprocessed.
 
@@ -97,6 +99,8 @@ def read_motions(
             that is cut short is left out.
         gain: counts/(m/s²) of a file in counts (miniSEED), of all its traces or of each by its
             trace index. Rejected for other files.
+        channel: the channels of a miniSEED file to read, such as ``HN?`` or ``10.HNE,10.HNN``
+            (location and channel; ? and * as in file names); None for all of acceleration.
 
     Raises:
         MotionFileError: the file cannot be read; the message names the line.
@@ -111,7 +115,7 @@ def read_motions(
     for member in members:
         within = archive_of(member)
         raw = read_bytes(member) if within is None else member_bytes(within, member)
-        record = RecordFile(member, _text(member, raw), units, dt_s, allow_partial, gain)
+        record = RecordFile(member, _text(member, raw), units, dt_s, allow_partial, gain, channel)
         motions += _read_whole(record)
     return motions
 
@@ -131,7 +135,7 @@ def motions_in(
         name: what messages call it; nothing of that name is looked for.
     """
     _check_stated(units, dt_s, gain)
-    # readers look for an index beside a file, and beside this one there is nothing
+    # readers look for an index next to a file, and next to this one there is none
     file = Path(os.devnull) / Path(name).name
     return _read_whole(RecordFile(file, _text(file, raw), units, dt_s, gain=gain))
 
@@ -190,13 +194,16 @@ def _read_whole(record: RecordFile) -> list[GroundMotion]:
 
 
 def _read(record: RecordFile) -> list[GroundMotion]:
-    file = record.path
-    reader = _reader(file, record.text)
-    if record.gain is not None and reader is not miniseed:
-        raise record.error(
-            f"the file is {reader.FORMAT}, which is not in counts: omit gain",
-            fields=("gain",),
-        )
+    file, head = record.path, record.text[:HEAD_CHARACTERS]
+    reader = next((reader for reader in READERS if reader.recognises(head)), None)
+    if reader is None:
+        formats = ", ".join(reader.FORMAT for reader in READERS)
+        raise UnknownFormatError(file, f"unknown format; supported are {formats}")
+    for name, trouble in (("gain", "is not in counts"), ("channel", "has no channel codes")):
+        if getattr(record, name) is not None and reader is not miniseed:
+            raise record.error(
+                f"the file is {reader.FORMAT}, which {trouble}: omit {name}", fields=(name,)
+            )
     try:
         traces = list(reader.parse(record))
         traces = agreed(record, traces, getattr(reader, "COMPONENTS", None))
@@ -240,15 +247,6 @@ def _motion(file: Path, trace: ParsedTrace, **place: Any) -> GroundMotion:
     )
 
 
-def _reader(file: Path, text: str) -> ModuleType:
-    head = text[:HEAD_CHARACTERS]
-    for reader in READERS:
-        if reader.recognises(head):
-            return reader
-    formats = ", ".join(reader.FORMAT for reader in READERS)
-    raise UnknownFormatError(file, f"unknown format; supported are {formats}")
-
-
 def read_motion(
     text: str | os.PathLike[str],
     *,
@@ -256,25 +254,23 @@ def read_motion(
     dt_s: float | None = None,
     allow_partial: bool = False,
     gain: float | None = None,
+    channel: str | None = None,
 ) -> GroundMotion:
     """Return one trace, named as ``FILE`` or ``FILE#trace_index``.
 
     Args:
         text: a path; for a file of several traces with ``#`` and the index, from 0.
     """
-    name = os.fspath(text)
-    index: int | None = None
-    stem, mark, tail = name.rpartition("#")
-    # int() rejects thousands of digits, and exists() names that are too long
-    if mark and tail.isascii() and tail.isdigit() and len(tail) < 10 and not _is_file(name):
-        name, index = stem, int(tail)
+    name, index = _name_and_index(text)
     if is_archive(file := Path(name)):
         members = members_of(file)
         listed = ", ".join(str(member.relative_to(file.parent)) for member in members[:5])
         raise MotionFileError(
             file, f"the zip archive has {len(members)} records: give one, such as {listed}"
         )
-    motions = read_motions(name, units=units, dt_s=dt_s, allow_partial=allow_partial, gain=gain)
+    motions = read_motions(
+        name, units=units, dt_s=dt_s, allow_partial=allow_partial, gain=gain, channel=channel
+    )
     if index is None and len(motions) == 1:
         return motions[0]
     if index is not None and index < len(motions):
@@ -282,6 +278,48 @@ def read_motion(
     listed = ", ".join(f"#{motion.trace_index} {motion.component}" for motion in motions)
     trouble = f"holds {len(motions)} traces" if index is None else f"has no trace #{index}"
     raise MotionFileError(name, f"the file {trouble}: give one of  {listed}, for example {name}#0")
+
+
+def _name_and_index(text: str | os.PathLike[str]) -> tuple[str, int | None]:
+    """Return the file of ``FILE#trace_index`` and the index, None without one."""
+    name = os.fspath(text)
+    stem, mark, tail = name.rpartition("#")
+    # int() rejects thousands of digits; no name is too long for os.path
+    is_index = mark and tail.isascii() and tail.isdigit() and len(tail) < 10
+    if is_index and not os.path.exists(name):  # noqa: PTH110
+        return stem, int(tail)
+    return name, None
+
+
+def read_horizontals(
+    text: str | os.PathLike[str], **reading: Any
+) -> tuple[GroundMotion, GroundMotion]:
+    """Return the two horizontal components of a recording in one file.
+
+    Args:
+        text: a path, or ``FILE#trace_index`` of one of them; the first of the file without it.
+        reading: options of :func:`read_motions`.
+
+    Raises:
+        MotionFileError: the file does not hold two horizontal components of the recording.
+    """
+    name, index = _name_and_index(text)
+    motions = read_motions(name, **reading)
+    horizontals = [motion for motion in motions if not motion.is_vertical]
+    first = next((m for m in horizontals if index in (None, m.trace_index)), None)
+    partners = [
+        motion
+        for motion in horizontals
+        if first is not None and motion is not first and motion.recording == first.recording
+    ]
+    if first is None or len(partners) != 1:
+        listed = ", ".join(f"#{motion.trace_index} {motion.component}" for motion in motions)
+        raise MotionFileError(
+            name,
+            f"the file must hold two horizontal components of one recording, it has {listed}: add "
+            "the files of both to a database, with companion_group in the metadata",
+        )
+    return first, partners[0]
 
 
 def as_motion(motion: MotionLike, name: str = "motion") -> GroundMotion:
@@ -304,8 +342,39 @@ def as_motion(motion: MotionLike, name: str = "motion") -> GroundMotion:
     )
 
 
-def _is_file(name: str) -> bool:
-    try:
-        return Path(name).exists()
-    except OSError:
-        return False
+FORMATS = ("csv", "at2")
+"""What a motion can be written as."""
+
+
+def export_motions(
+    motions: Sequence[GroundMotion], path: str | os.PathLike[str], *, file_format: str | None = None
+) -> str:
+    """Write motions into one file, completely or not at all; samples are read back bit for bit.
+
+    Args:
+        motions: equally spaced motions; a CSV takes several, an AT2 file one.
+        path: the file to write.
+        file_format: ``csv`` or ``at2``; None for what the name ends in.
+
+    Returns:
+        The format written.
+
+    Raises:
+        InputError: no motion, an unknown format, several motions for an AT2 file, a motion from
+            nodes, or a file that cannot be written.
+    """
+    target = Path(path)
+    chosen = (file_format or target.suffix.lstrip(".")).lower()
+    if chosen not in FORMATS:
+        raise InputError(
+            f"{target.name}: unsupported format {chosen!r}: use the suffix .csv or .at2, or format",
+            fields=("format",),
+        )
+    if not motions:
+        raise InputError("no motion to export: give at least one")
+    if chosen == "at2" and len(motions) > 1:
+        raise InputError(f"an AT2 file has one motion, not {len(motions)}: use .csv")
+    lines = peer_at2.write(motions[0]) if chosen == "at2" else rbfrag_csv.write(motions)
+    with written_whole(target) as draft, draft.open("w", newline="\n", encoding="utf-8") as file:
+        file.writelines(f"{line}\n" for line in lines)
+    return chosen

@@ -17,26 +17,10 @@ _IN_G = {
 }
 
 _SPELLINGS = {
-    "g": "g",
-    "g's": "g",
-    "gs": "g",
-    "m/s2": "m/s2",
-    "m/sec2": "m/s2",
-    "m/s/s": "m/s2",
-    "m/sec/sec": "m/s2",
-    "cm/s2": "cm/s2",
-    "cm/sec2": "cm/s2",
-    "cm/s/s": "cm/s2",
-    "cm/sec/sec": "cm/s2",
-    "gal": "cm/s2",
-    "gals": "cm/s2",
-    "mm/s2": "mm/s2",
-    "mm/sec2": "mm/s2",
-    "mm/s/s": "mm/s2",
-    "mm/sec/sec": "mm/s2",
-    "ms-2": "m/s2",
-    "cms-2": "cm/s2",
-    "mms-2": "mm/s2",
+    **dict.fromkeys(("g", "g's", "gs"), "g"),
+    **dict.fromkeys(("m/s2", "m/sec2", "m/s/s", "m/sec/sec", "ms-2"), "m/s2"),
+    **dict.fromkeys(("cm/s2", "cm/sec2", "cm/s/s", "cm/sec/sec", "cms-2", "gal", "gals"), "cm/s2"),
+    **dict.fromkeys(("mm/s2", "mm/sec2", "mm/s/s", "mm/sec/sec", "mms-2"), "mm/s2"),
 }
 
 _AS_TYPED = str.maketrans({"²": "2", "⁻": "-", **dict.fromkeys("^*·⋅ \u00a0")})

@@ -1,19 +1,24 @@
-"""Figure creation and saving, axis numbers, point clouds, and colours of modes.
+"""Figure creation and saving, axis numbers, point clouds, labels, and colours of modes.
 
 Every figure rejects a path that cannot be written before it draws (InputError), and says which
 extra brings matplotlib where it is missing (MissingExtraError).
+
+A label is written next to its data point. When the figure is saved, where all is laid out,
+each label takes the first of the places around its point where it covers no line, no point and no
+other text, or the one where it covers least.
 """
 
 from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import wraps
 from io import BytesIO
 from os import PathLike
 from pathlib import Path
+from textwrap import wrap
 from typing import TYPE_CHECKING, Any, Literal, ParamSpec, TypeVar
 
 import numpy as np
@@ -21,13 +26,16 @@ from numpy.typing import NDArray
 
 from rbfrag.errors import MissingExtraError
 from rbfrag.files import output_path, written_whole
-from rbfrag.plots.labels import settle_labels
 from rbfrag.solver.stability.modes import ModeName
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.axis import Axis
     from matplotlib.figure import Figure
+    from matplotlib.path import Path as LinePath
+    from matplotlib.text import Annotation
+    from matplotlib.transforms import Bbox
+
 
 SUFFIXES = (".png", ".pdf", ".svg")
 """File types that a figure can be saved as."""
@@ -167,16 +175,16 @@ def written_numbers(axis: Axis, *digits: float) -> None:
             return super().tick_values(low, high)
 
     axis.set_major_locator(LeadingDigits())
-    axis.set_major_formatter(FuncFormatter(lambda value, _: _number(value)))
+
+    def as_text(value: float, _: object) -> str:
+        digits, power, exponent = f"{value:g}".partition("e")
+        if not power:
+            return digits
+        factor = "" if digits == "1" else rf"{digits}\times"
+        return f"${factor}10^{{{int(exponent)}}}$"
+
+    axis.set_major_formatter(FuncFormatter(as_text))
     axis.set_minor_formatter(NullFormatter())
-
-
-def _number(value: float) -> str:
-    digits, power, exponent = f"{value:g}".partition("e")
-    if not power:
-        return digits
-    factor = "" if digits == "1" else rf"{digits}\times"
-    return f"${factor}10^{{{int(exponent)}}}$"
 
 
 def spread_out(
@@ -247,7 +255,7 @@ def density(
     across: tuple[float, float],
     up: tuple[float, float],
     *,
-    beside: Sequence[Axes] = (),
+    further_axes: Sequence[Axes] = (),
 ) -> None:
     """Draw points, or for many points hexagons shaded by count; axes linear or logarithmic.
 
@@ -257,7 +265,7 @@ def density(
         y: ordinates, shape (n,).
         across: limits of the abscissa, which the axes get.
         up: limits of the ordinate.
-        beside: other axes that the key of the shades stands to the right of.
+        further_axes: other axes that the key of the shades stands to the right of.
     """
     from matplotlib import colormaps
     from matplotlib.colors import ListedColormap, LogNorm
@@ -281,7 +289,7 @@ def density(
     axes.set_ylim(*up)  # which the cells have widened
     most = max(int(np.asarray(cells.get_array()).max(initial=1)), 2)
     cells.set_norm(LogNorm(1, most))
-    key = figure.colorbar(cells, ax=[axes, *beside], label="critical blocks per cell")
+    key = figure.colorbar(cells, ax=[axes, *further_axes], label="critical blocks per cell")
     ticks = [t * 10**k for k in range(7) for t in (1, 2, 5) if t * 10**k <= most]
     key.ax.yaxis.set_major_locator(FixedLocator(ticks))
     key.ax.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:.0f}"))
@@ -299,13 +307,145 @@ MODE_COLOURS: dict[ModeName, str] = {
 }
 
 MODE_LINES: dict[ModeName, str] = {
-    "slide": "-",
-    "topple": "-.",
-    "slump": "--",
-    "confined_topple": ":",
-}
+    "slide": "-", "topple": "-.", "slump": "--", "confined_topple": ":",
+}  # fmt: skip
 
 
 def mode_title(mode: str) -> str:
     """Return the display name of a mode or kind."""
     return mode.replace("_", " ")
+
+
+_MOVABLE = "_movable label"
+"""What matplotlib calls labels that may be moved; a name with a dash before it is in no legend."""
+
+_OFF_THE_AXES, _ON_TEXT, _ON_LINE = 100.0, 20.0, 4.0
+"""What it costs a place to leave the axes, and to cover a text or a line."""
+
+
+def as_written(name: str, letters: int, lines: int = 3) -> str:
+    """Return a name from a file for a figure: letters only, in a few lines.
+
+    A dollar sign begins no formula, and a legend leaves out no name for its first underscore.
+
+    Args:
+        name: what a file or the user calls something.
+        letters: the most letters of a line.
+        lines: the most lines.
+    """
+    shown = "".join(letter if letter.isprintable() else " " for letter in name)
+    text = "\n".join(wrap(shown, letters, max_lines=lines, placeholder=" …")).replace("$", r"\$")
+    return f" {text}" if text.startswith("_") else text
+
+
+def halo(width: float = 2.5) -> dict[str, Any]:
+    """Return the style of a text with a white outline.
+
+    Args:
+        width: thickness of the rim [points].
+    """
+    from matplotlib.patheffects import withStroke
+
+    return {"path_effects": [withStroke(linewidth=width, foreground="white")]}
+
+
+def write_near(
+    axes: Axes,
+    text: str,
+    at: tuple[float, float],
+    offset: tuple[float, float],
+    *,
+    movable: bool = True,
+    **style: Any,
+) -> None:
+    """Write a text with a halo near a point of the data.
+
+    Args:
+        at: the place, in data coordinates unless `style` has ``xycoords``.
+        offset: where the label is best, from the place [points]; it begins there on that side.
+        movable: whether it may stand on another side where it would cover something.
+        style: as matplotlib's annotate takes it.
+    """
+    label = axes.annotate(
+        text, at, xytext=offset, textcoords="offset points", zorder=style.pop("zorder", 8),
+        **{**_alignment(offset), **halo(), **style},
+    )  # fmt: skip
+    if movable:
+        label.set_label(_MOVABLE)
+        # a label that moves must not move the axes that it was placed by
+        label.set_in_layout(False)
+
+
+def settle_labels(figure: Figure) -> None:
+    """Move every movable label of a figure to where it covers least."""
+    labels: list[Any] = figure.findobj(lambda artist: artist.get_label() == _MOVABLE)
+    if not labels:
+        return
+    figure.draw_without_rendering()
+    settled: list[Bbox] = []
+    for label in labels:
+        axes = label.axes
+        legend = axes.get_legend()
+        fixed_texts = [text for text in axes.texts if text not in labels and text.get_text()]
+        fixed_texts = [*(legend.get_texts() if legend else ()), *fixed_texts]
+        obstacles = [*settled, *(text.get_window_extent() for text in fixed_texts)]
+        lines = list(_lines(axes))
+        best, least = label.xyann, math.inf
+        for rank, offset in enumerate(_label_offsets(label.xyann)):
+            _move(label, offset)
+            cost = rank * 0.1 + _cost(label.get_window_extent(), axes, obstacles, lines)
+            if cost < least:
+                best, least = offset, cost
+        _move(label, best)
+        settled.append(label.get_window_extent())
+
+
+def _label_offsets(offset: tuple[float, float]) -> Iterator[tuple[float, float]]:
+    """Yield offsets around a point; the given offset and its mirror images come first."""
+    x, y = offset
+    reach = math.hypot(x, y)
+    yield from dict.fromkeys([(x, y), (x, -y), (-x, y), (-x, -y)])
+    for farther in (1.0, 2.0, 3.5):
+        for turn in range(8):
+            angle = math.atan2(y, x) + turn * math.pi / 4.0
+            yield (farther * reach * math.cos(angle), farther * reach * math.sin(angle))
+
+
+def _alignment(offset: tuple[float, float]) -> dict[str, str]:
+    """Return the alignment of a text that begins at an offset from its point."""
+    x, y = offset
+    small = 0.2 * math.hypot(x, y)
+    return {
+        "ha": "center" if abs(x) <= small else "left" if x > 0.0 else "right",
+        "va": "center" if abs(y) <= small else "bottom" if y > 0.0 else "top",
+    }
+
+
+def _move(label: Annotation, offset: tuple[float, float]) -> None:
+    label.xyann = offset
+    label.set(**_alignment(offset))
+
+
+def _cost(box: Bbox, axes: Axes, obstacles: Sequence[Bbox], lines: Sequence[LinePath]) -> float:
+    frame, rim = axes.get_window_extent(), box.padded(1.5)
+    outside = not (frame.contains(*box.min) and frame.contains(*box.max))
+    covered = sum(rim.overlaps(obstacle) for obstacle in obstacles)
+    crossed = sum(
+        path.intersects_bbox(rim, filled=False) or rim.count_contains(path.vertices) > 0
+        for path in lines
+    )
+    return _OFF_THE_AXES * outside + _ON_TEXT * covered + _ON_LINE * crossed
+
+
+def _lines(axes: Axes) -> Iterator[LinePath]:
+    """Yield the lines and points of axes as paths, in pixels."""
+    from matplotlib.path import Path as LinePath
+
+    for line in axes.lines:
+        path = line.get_transform().transform_path(line.get_path())
+        vertices = np.asarray(path.vertices)
+        yield LinePath(vertices[np.isfinite(vertices).all(axis=1)])
+    for points in axes.collections:
+        offsets = np.ma.getdata(points.get_offsets())
+        if len(offsets) > 1:
+            yield LinePath(points.get_offset_transform().transform(offsets))

@@ -1,30 +1,28 @@
-"""Design chart of the probability of toppling, for reading by hand."""
+"""Design charts for reading by hand: of toppling, and of the other kinds of failure."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from rbfrag.errors import InputError
 from rbfrag.fragility import describe
 from rbfrag.fragility.measures import TERMS
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.fragility.prediction import array_answer
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.plots import canvas
-from rbfrag.plots.labels import as_written
-from rbfrag.plots.model_lines import (
-    MORE_TERMS,
-    HeldMeasures,
-    failure_line,
-    held_measures,
-)
+from rbfrag.plots.canvas import as_written
+from rbfrag.plots.model_lines import MORE_TERMS, HeldMeasures, failure_line, held_measures
 from rbfrag.results.numbers import exact_percent
+from rbfrag.vocabulary.quantities import QUANTITIES
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+
 
 CONTOURS = (0.01, 0.05, 0.1, 0.25, 0.5, 0.75, 0.9, 0.95, 0.99)
 
@@ -59,7 +57,7 @@ def plot_chart(
     """Draw lines of equal probability of toppling over intensity and block.
 
     The ordinate is the block's toppling velocity k_r g/p, and of blocks of a given size k_r. What
-    the model reads beside it and the intensity is held: the size of the block, and PGA and Tm of a
+    the model uses in addition and the intensity is held: the size of the block, and PGA and Tm of a
     model of PGV with PGA, which is drawn over PGV; the caption says at what. The sheet reaches
     little beyond the ranges that were fitted, and is shaded there.
 
@@ -72,7 +70,13 @@ def plot_chart(
     figure = canvas.new_figure(7.4, 6.6)
     axes = figure.add_subplot()
     draw_chart(axes, model, held)
-    axes.set_title(_caption(model, held), fontsize=10)
+    fitted = describe.fitted_data(model.row.diagnostics)
+    axes.set_title(
+        f"{as_written(f'Probability that the block topples: model {model.name}', 85)}\n"
+        f"{held.words + chr(10) if held.words else ''}"
+        f"{fitted + '; ' if fitted else ''}shaded: outside the fitted range",
+        fontsize=10,
+    )
     return canvas.save_figure(figure, path)
 
 
@@ -89,11 +93,19 @@ def draw_chart(
         axes: empty axes.
         point: intensity and toppling velocity of a block to show [m/s], or measure in its unit.
     """
+    from matplotlib.ticker import NullLocator
+
     across, up = _known_ranges(model, held)
     ends = [*across, *([] if point is None else [point[0]])]
     x = np.geomspace(min(ends) / _SPAN, _SPAN * max(ends), _POINTS)
     lines = {p: failure_line(model, x, p, held) for p in CONTOURS}
-    bottom, top = _vertical_range(lines, up)
+    drawn = np.concatenate(list(lines.values()))
+    drawn = drawn[np.isfinite(drawn)]
+    bottom, top = 0.8 * float(drawn.min()), 1.25 * float(drawn.max())
+    if up is None:
+        bottom = max(bottom, 1e-4 * top)
+    else:
+        bottom, top = max(bottom, up[0] / _SPAN), min(top, max(_SPAN * up[1], 2.0 * bottom))
     if point is not None:
         bottom, top = min(bottom, point[1] / _SPAN), max(top, _SPAN * point[1])
     width_pt, height_pt = _size_pt(axes)
@@ -105,16 +117,32 @@ def draw_chart(
         axes.plot(x, y, color=canvas.BLUE, lw=thin * (1.9 if probability in _BOLD else 0.9))
     _write_beside(axes, x, lines)
     if held.words:
-        _shade_where_not_fitted(axes, model, held)
+        # where the combination of block and motion lies outside the fitted range
+        nodes = [np.geomspace(*ends, _NODES) for ends in (axes.get_xlim(), axes.get_ylim())]
+        outside = np.where(_is_fitted(model, held, *np.meshgrid(*nodes)), 0.0, 1.0)
+        axes.contourf(*nodes, outside, [0.5, 1.5], colors="#8a8a8a", alpha=0.25, zorder=0.5)
     else:
-        _shade_outside(axes, across, up)
+        shade: dict[str, Any] = {"facecolor": "#8a8a8a", "alpha": 0.25, "lw": 0.0, "zorder": 0.5}
+        axes.axvspan(x[0], across[0], **shade)
+        axes.axvspan(across[1], x[-1], **shade)
+        if up is not None:
+            axes.axhspan(bottom, max(up[0], bottom), **shade)
+            axes.axhspan(min(up[1], top), top, **shade)
     axes.set_xlabel(TERMS["pgv"].label if model.term.name in MORE_TERMS else model.term.label)
     axes.set_ylabel("toppling velocity of the block, $y = k_r\\,g/p$ [m/s]")
     axes.grid(visible=True, which="major", lw=0.6, color="#9a9a9a")
     axes.grid(visible=True, which="minor", lw=0.3, color="#c8c8c8")
     axes.set_axisbelow(True)
     if held.size_is_given:
-        _draw_kr_axis(axes, held.p2, digits[1])
+        # an axis of k_r for blocks of one size, right of the probabilities
+        per_kr = STANDARD_GRAVITY_M_S2 / math.sqrt(held.p2)
+        kr_axis = axes.secondary_yaxis(
+            1.0 + _KR_AXIS_OFF_PT / width_pt,
+            functions=(lambda y: np.asarray(y) / per_kr, lambda kr: np.asarray(kr) * per_kr),
+        )
+        canvas.written_numbers(kr_axis.yaxis, *digits[1])
+        kr_axis.yaxis.set_minor_locator(NullLocator())
+        kr_axis.set_ylabel(f"$k_r$ at $p^2$ = {held.p2:.3g} s$^{{-2}}$")
     if point is not None:
         axes.plot(
             *point, "o", ms=8, color=canvas.RED, mec="white", mew=1.2, zorder=9, label="_point"
@@ -144,36 +172,10 @@ def _known_ranges(
     return (float(x[0]), float(x[-1])), (float(y[inside].min()), float(y[inside].max()))
 
 
-def _vertical_range(
-    lines: dict[float, np.ndarray], fitted: tuple[float, float] | None
-) -> tuple[float, float]:
-    """Return the ordinate range that shows the lines, limited near the fitted range."""
-    drawn = np.concatenate(list(lines.values()))
-    drawn = drawn[np.isfinite(drawn)]
-    bottom, top = 0.8 * float(drawn.min()), 1.25 * float(drawn.max())
-    if fitted is None:
-        return max(bottom, 1e-4 * top), top
-    return max(bottom, fitted[0] / _SPAN), min(top, max(_SPAN * fitted[1], 2.0 * bottom))
-
-
 def _digits(ratio: float, size_pt: float, apart_pt: float) -> tuple[float, ...]:
     """Return the leading digits of axis labels that fit the available space."""
     usual = (1.0, 2.0, 5.0)
     return usual if size_pt > len(usual) * apart_pt * math.log10(ratio) else usual[:1]
-
-
-def _draw_kr_axis(axes: Axes, p2: float, digits: Sequence[float]) -> None:
-    """Add an axis of k_r for blocks of one size, right of the probabilities."""
-    from matplotlib.ticker import NullLocator
-
-    per_kr = STANDARD_GRAVITY_M_S2 / math.sqrt(p2)
-    beside = axes.secondary_yaxis(
-        1.0 + _KR_AXIS_OFF_PT / _size_pt(axes)[0],
-        functions=(lambda y: np.asarray(y) / per_kr, lambda kr: np.asarray(kr) * per_kr),
-    )
-    canvas.written_numbers(beside.yaxis, *digits)
-    beside.yaxis.set_minor_locator(NullLocator())
-    beside.set_ylabel(f"$k_r$ at $p^2$ = {p2:.3g} s$^{{-2}}$")
 
 
 def _write_beside(axes: Axes, x: np.ndarray, lines: dict[float, np.ndarray]) -> None:
@@ -189,16 +191,16 @@ def _write_beside(axes: Axes, x: np.ndarray, lines: dict[float, np.ndarray]) -> 
             ends.append((float((np.log(y[at]) - bottom) / (top - bottom)), across, probability))
     ends.sort()
     width_pt, height_pt = _size_pt(axes)
-    beside = 1.0 + _LABEL_OFF_PT / width_pt
+    label_x = 1.0 + _LABEL_OFF_PT / width_pt
     positions = canvas.spread_out([up for up, *_ in ends], _LABEL_APART_PT / height_pt, 0.01, 0.99)
     for position, (up, across, probability) in zip(positions, ends, strict=True):
         text = exact_percent(probability)
         axes.plot(
-            [across, beside - 0.005], [up, position], color=canvas.BLUE, lw=0.5,
+            [across, label_x - 0.005], [up, position], color=canvas.BLUE, lw=0.5,
             transform=axes.transAxes, clip_on=False, label=f"_{text}",
         )  # fmt: skip
         axes.text(
-            beside, position, text, fontsize=8, va="center", color=canvas.BLUE,
+            label_x, position, text, fontsize=8, va="center", color=canvas.BLUE,
             transform=axes.transAxes, fontweight="bold" if probability in _BOLD else "normal",
         )  # fmt: skip
 
@@ -207,24 +209,6 @@ def _size_pt(axes: Axes) -> tuple[float, float]:
     """Return width and height of axes before the layout of the figure [points]."""
     box = axes.get_window_extent()
     return 72.0 * box.width / axes.figure.dpi, 72.0 * box.height / axes.figure.dpi
-
-
-def _shade_outside(axes: Axes, across: tuple[float, float], up: tuple[float, float] | None) -> None:
-    x_left, x_right = axes.get_xlim()
-    bottom, top = axes.get_ylim()
-    shade: dict[str, Any] = {"facecolor": "#8a8a8a", "alpha": 0.25, "lw": 0.0, "zorder": 0.5}
-    axes.axvspan(x_left, across[0], **shade)
-    axes.axvspan(across[1], x_right, **shade)
-    if up is not None:
-        axes.axhspan(bottom, max(float(up[0]), bottom), **shade)
-        axes.axhspan(min(float(up[1]), top), top, **shade)
-
-
-def _shade_where_not_fitted(axes: Axes, model: FragilityModel, held: HeldMeasures) -> None:
-    """Shade where the combination of block and motion lies outside the fitted range."""
-    x, y = (np.geomspace(*ends, _NODES) for ends in (axes.get_xlim(), axes.get_ylim()))
-    outside = np.where(_is_fitted(model, held, *np.meshgrid(x, y)), 0.0, 1.0)
-    axes.contourf(x, y, outside, [0.5, 1.5], colors="#8a8a8a", alpha=0.25, zorder=0.5)
 
 
 def _is_fitted(
@@ -237,10 +221,118 @@ def _is_fitted(
     return fitted
 
 
-def _caption(model: FragilityModel, held: HeldMeasures) -> str:
-    fitted = describe.fitted_data(model.row.diagnostics)
-    return (
-        f"{as_written(f'Probability that the block topples: model {model.name}', 85)}\n"
-        f"{held.words + chr(10) if held.words else ''}"
-        f"{fitted + '; ' if fitted else ''}shaded: outside the fitted range"
+_PERIODS_S = {"sa03_g": ("sa03_over_pga", 0.0), "sa10_g": ("v10_over_pgv", 1.0),
+              "sa30_g": ("v30_over_pgv", 3.0)}  # fmt: skip
+
+
+@canvas.in_own_style
+def plot_kind_chart(
+    model: FragilityModel, path: canvas.Out, options: Mapping[str, float]
+) -> canvas.Picture:
+    """Draw lines of equal probability against a model's first measure and the yield.
+
+    What else the model reads is held at the middle of its fitted range; measures keep the middle
+    ratio to the first. The caption says at what; what was not fitted is shaded.
+
+    Args:
+        model: a model of any kind.
+        path: file to write.
+        options: what is held at other values, by field.
+
+    Raises:
+        InputError: a value that is not above zero or not read, or a measure that does not go in
+            proportion to the first.
+    """
+    canvas.plot_path(path)
+    names, domain = model.method.block.names, model.row.domain
+    strength = next(name for name in names if name.startswith("k"))
+    first, *other_names = model.term.inputs
+    held = {name: math.sqrt(math.prod(domain[name])) for name in names if name != strength}
+    held |= {"beta_deg": 0.0} if "beta_deg" in model.method.block.options else {}
+    if "magnitude" in other_names:
+        held["magnitude"] = sum(domain["magnitude"]) / 2.0
+    for name, value in options.items():
+        if name not in held and name not in other_names:
+            raise InputError(
+                f"{name} = {value:g} has no effect: model {model.name!r} does not use it, or it "
+                "is an axis; omit it",
+                fields=(name,),
+            )
+        if not 0.0 < value < math.inf:
+            raise InputError(f"{name} = {value:g} is not above zero", fields=(name,))
+    held |= options
+    across = domain.get(first) or (0.02, 2.0)
+    x = np.geomspace(max(across[0], 0.02), across[1], _NODES)
+    y = np.geomspace(*(domain.get(strength) or (0.02, 1.0)), _NODES)
+    xs, ys = np.meshgrid(x, y)
+    inputs: dict[str, Any] = {first: xs, strength: ys, **held}
+    ratios = []
+    for name in other_names:
+        if name not in inputs:
+            inputs[name], words = _in_proportion(name, first, xs, model)
+            ratios.append(words)
+    answers = array_answer(
+        model, {name: np.broadcast_to(v, xs.shape) for name, v in inputs.items()}
+    )
+    figure = canvas.new_figure(7.4, 6.6)
+    axes = figure.add_subplot()
+    canvas.logarithmic(axes, (1.0, 2.0, 5.0), (1.0, 2.0, 5.0))
+    outside = np.where(answers.in_domain, 0.0, 1.0)
+    axes.contourf(x, y, outside, [0.5, 1.5], colors="#8a8a8a", alpha=0.25)
+    lines = axes.contour(x, y, answers.probability, CONTOURS, colors=canvas.BLUE, linewidths=1.1)
+    label_points = _label_points(x, y, answers.probability)
+    axes.clabel(lines, fmt=exact_percent, fontsize=8, manual=[*label_points])
+    axes.set(xlim=(x[0], x[-1]), ylim=(y[0], y[-1]))
+    about = QUANTITIES[first]
+    axes.set_xlabel(f"{about.noun} [{about.unit}]")
+    axes.set_ylabel(f"yield acceleration coefficient, $k_{{{strength[1:]}}}$")
+    axes.grid(visible=True, which="both", lw=0.4, color="#c0c0c0")
+    at = [" = ".join(describe.labelled_value(name, value, 3)) for name, value in held.items()]
+    kind = model.method.block.kind.replace("_", " ")
+    title = as_written(f"Probability of failure, {kind}: model {model.name}", 85)
+    conditions = as_written(f"at {', '.join([*at, *ratios])}", 85)
+    axes.set_title(f"{title}\n{conditions}\nshaded: outside the fitted range", fontsize=10)
+    return canvas.save_figure(figure, path)
+
+
+def _label_points(x: np.ndarray, y: np.ndarray, p: np.ndarray) -> Iterator[tuple[float, float]]:
+    """Yield a label position on each line of the chart, staggered and away from the frame."""
+    margin = _NODES // 12
+    for level, height in zip(CONTOURS, np.linspace(0.85, 0.15, len(CONTOURS)), strict=True):
+        column = (p < level).sum(axis=1)
+        inside = np.flatnonzero((column > margin) & (column < _NODES - margin))
+        inside = inside[(inside > margin) & (inside < _NODES - margin)]
+        if inside.size:
+            row = inside[np.abs(inside - height * _NODES).argmin()]
+            yield float(x[column[row]]), float(y[row])
+
+
+def _in_proportion(
+    name: str, first: str, x: np.ndarray, model: FragilityModel
+) -> tuple[np.ndarray, str]:
+    """Return a measure at the middle fitted ratio to the first one, and the ratio as text."""
+    domain, g = model.row.domain, STANDARD_GRAVITY_M_S2
+
+    def middle(ratio: str) -> float:
+        return math.sqrt(math.prod(domain[ratio]))
+
+    seconds = middle("pgv_over_pga_s")
+    pgv = x if first == "pgv_m_s" else x * seconds * g if first == "pga_g" else None
+    if first == "sa10_g":
+        pgv = x * g / (2.0 * math.pi * middle("v10_over_pgv"))
+    if pgv is not None and name == "pga_g":
+        return pgv / (seconds * g), f"PGV/(PGA g) = {seconds:.3g} s"
+    if pgv is not None and name in _PERIODS_S:
+        ratio, period_s = _PERIODS_S[name]
+        of = middle(ratio)
+        sa = of * pgv * 2.0 * math.pi / (period_s * g) if period_s else of * pgv / (seconds * g)
+        return sa, f"{ratio.replace('_over_', '/')} = {of:.3g}"
+    if pgv is not None and name == "arias_m_s" and name in domain:
+        # twice the acceleration is four times the intensity
+        of = middle(name) / math.prod(domain["pgv_m_s"])
+        return of * pgv**2, f"Arias/PGV² = {of:.3g} s/m"
+    raise InputError(
+        f"model {model.name!r} uses {' and '.join(model.term.inputs)}, and {name} is not "
+        f"proportional to {first}: give it, or choose another model",
+        fields=(name,),
     )

@@ -15,19 +15,8 @@ from rbfrag.fragility import describe
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.fragility.prediction import array_answer
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
-from rbfrag.plots.canvas import (
-    BLUE,
-    RED,
-    Out,
-    Picture,
-    in_own_style,
-    legend_below,
-    light_grid,
-    new_figure,
-    plot_path,
-    save_figure,
-)
-from rbfrag.plots.labels import as_written
+from rbfrag.plots import canvas
+from rbfrag.plots.canvas import BLUE, RED, as_written
 from rbfrag.question.keywords import LEVEL
 from rbfrag.results.numbers import exact_percent
 from rbfrag.solver.kinds import mode_of_kind
@@ -61,18 +50,18 @@ FAILS = {"topple": "topples", "slide": "slides too far", "slump": "slumps"}
 _SUBSCRIPT = re.compile(r"([kp])_([a-z])")
 
 
-@in_own_style
+@canvas.in_own_style
 def plot_curve(
     model: FragilityModel,
     block: Mapping[str, float],
-    path: Out,
+    path: canvas.Out,
     *,
     over: str | None = None,
     fixed: Mapping[str, float] | None = None,
     level: float = LEVEL,
     compared: Mapping[str, Callable[[FloatArray], FloatArray]] | None = None,
     sites: float | None = None,
-) -> Picture:
+) -> canvas.Picture:
     """Draw the fragility curve of one block with its confidence interval.
 
     P is the share of such blocks that fail over all earthquakes and sites with this shaking, its
@@ -91,7 +80,8 @@ def plot_curve(
         InputError: a value that cannot be used, a measure that is missing, too many to compare
             with, or a path that cannot be written.
     """
-    plot_path(path)
+    canvas.plot_path(path)
+    compared = compared or {}
     varied = model.term.inputs[0] if over is None else over
     if varied not in model.term.inputs or varied not in AXIS:
         raise InputError(
@@ -105,39 +95,36 @@ def plot_curve(
             f"{' and '.join(missing)} for the curve"
         )
     held = {name: float((fixed or {})[name]) for name in fixed_names}
-    if len(compared or {}) > MOST_COMPARED:
+    if len(compared) > MOST_COMPARED:
         raise InputError(
-            f"{len(compared or {})} fragility functions for comparison: the maximum is "
-            f"{MOST_COMPARED}"
+            f"{len(compared)} fragility functions for comparison: the maximum is {MOST_COMPARED}"
         )
-    lines = max((as_written(name, _LETTERS).count("\n") + 1 for name in compared or {}), default=0)
-    figure = new_figure(7.0, 4.6 + _LINE_IN * lines * math.ceil(len(compared or {}) / 2))
+    lines = max((as_written(name, _LETTERS).count("\n") + 1 for name in compared), default=0)
+    figure = canvas.new_figure(7.0, 4.6 + _LINE_IN * lines * math.ceil(len(compared) / 2))
     axes = figure.add_subplot()
     draw_curve(axes, model, block, varied, held, level=level, compared=compared, sites=sites)
     y_m_s = _velocity_m_s(model, block)
     about_block = _SUBSCRIPT.sub(r"$\1_\2$", describe.labelled_values(block, 3))
     about_block += "" if y_m_s is None else f", $y$ = {y_m_s:.3g} m/s"
-    conditions = ", ".join(_condition(name, held[name]) for name in fixed_names)
+    conditions = []
+    for name in fixed_names:
+        symbol, period_s = QUANTITIES[name].symbol, MEASURES[name].period_s
+        if period_s is not None:
+            symbol = f"SA({period_s:.1f} s)"
+        elif "_" in symbol or len(symbol) == 1:
+            symbol = f"${symbol}$"
+        conditions.append(f"{symbol} = {held[name]:g} {QUANTITIES[name].unit}".rstrip())
+    about_block += f"; {', '.join(conditions)}" if conditions else ""
     fitted = describe.fitted_data(model.row.diagnostics)
     model_name = f"model {describe.stored_model(model.row)}"
     axes.set_title(
-        "\n".join(wrap(f"block {about_block}{f'; {conditions}' if conditions else ''}", 85))
+        "\n".join(wrap(f"block {about_block}", 85))
         + "\n"
         + as_written(", ".join(filter(None, (model_name, fitted))), 85),
         fontsize=10,
     )
-    legend_below(figure, 2)
-    return save_figure(figure, path)
-
-
-def _condition(name: str, value: float) -> str:
-    """Return the text of a measure held constant."""
-    symbol, period_s = QUANTITIES[name].symbol, MEASURES[name].period_s
-    if period_s is not None:
-        symbol = f"SA({period_s:.1f} s)"
-    elif "_" in symbol or len(symbol) == 1:
-        symbol = f"${symbol}$"
-    return f"{symbol} = {value:g} {QUANTITIES[name].unit}".rstrip()
+    canvas.legend_below(figure, 2)
+    return canvas.save_figure(figure, path)
 
 
 def draw_curve(
@@ -174,8 +161,9 @@ def draw_curve(
         label=f"{percent} confidence interval",
     )  # fmt: skip
     if not in_range.all():
-        outside = "outside the fitted range"
-        axes.plot(x, answer.probability, "--", color=BLUE, lw=1.2, label=outside)
+        axes.plot(
+            x, answer.probability, "--", color=BLUE, lw=1.2, label="outside the fitted range"
+        )  # fmt: skip
     fitted = np.where(in_range, answer.probability, np.nan)
     axes.plot(x, fitted, color=BLUE, lw=2.0, label="P: fraction over all earthquakes and sites")
     for i, (name, other) in enumerate((compared or {}).items()):
@@ -184,7 +172,7 @@ def draw_curve(
     axes.set(xlim=(0.0, end), ylim=(0.0, 1.0))
     fails = FAILS.get(mode_of_kind(model.row.kind), "fails")
     axes.set(xlabel=AXIS[varied], ylabel=f"probability that the block {fails}")
-    light_grid(axes)
+    canvas.light_grid(axes)
     if at > 0.0:
         pointed = array_answer(model, {**block, varied: np.array([at]), **held}, level)
         p = float(pointed.probability[0])

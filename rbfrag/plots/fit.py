@@ -1,7 +1,10 @@
-"""Figure of a fitted model: critical blocks against intensity, with the failure lines."""
+"""Figures of a fitted model: its data with the failure lines and its equation, its calibration."""
 
 from __future__ import annotations
 
+import math
+import re
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -10,15 +13,17 @@ from numpy.typing import NDArray
 from rbfrag.db.rows import CombinationTable
 from rbfrag.errors import InputError
 from rbfrag.fragility.fit.line import Bins, bin_variances
-from rbfrag.fragility.method import TOPPLING_BLOCK, FittedVariance
+from rbfrag.fragility.fit.result import CalibrationBins
+from rbfrag.fragility.method import TOPPLING_BLOCK, Form
+from rbfrag.fragility.methods.wls import mean_m_s, variance_m2_s2
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.plots import canvas
-from rbfrag.plots.equation import equation_lines
-from rbfrag.plots.labels import as_written
+from rbfrag.plots.canvas import as_written
 from rbfrag.plots.model_lines import depends_on_size, failure_line, predicted_strengths, smooth_line
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+
 
 _LINES = (
     (0.025, "--", canvas.RED, "2.5 % probability of failure"),
@@ -70,32 +75,24 @@ def plot_fit(
         )
     alone = not depends_on_size(model)
     spectrum = np.full(table.p2.shape, np.nan) if xp_m_s is None else xp_m_s
-    x = (
-        np.asarray(
-            term.intensity_m_s({name: table.measure(name) for name in term.inputs}),
-            dtype=np.float64,
-        )
-        if alone
-        else predicted_strengths(model, table, spectrum, 0.5)
-    )
+    if alone:
+        x = np.asarray(term.intensity_m_s({name: table.measure(name) for name in term.inputs}))
+    else:
+        x = predicted_strengths(model, table, spectrum, 0.5)
     shown = (table.status == "found") & np.isfinite(x) & np.isfinite(table.y_m_s)
     if not shown.any():
         raise InputError(
             f"no critical values with the term {term.name} to draw: run  rbfrag simulate"
         )
-    fitted = model.method.fitted_variance if alone else None
-    binned = fitted is not None
+    binned = alone and model.method.fit == "line"  # whose variance is fitted in bins
     figure = canvas.new_figure(7.6, 7.6 if binned else 6.2)
     expected = x
     x, y = x[shown], table.y_m_s[shown]
     x_left, x_right = (0.9 * float(x.min()), 1.1 * float(x.max())) if log else (0.0, 1.03 * x.max())
+    spaced = np.geomspace if log else np.linspace
     lines = []
     for probability, *_ in _LINES:
-        line_x = (
-            np.geomspace(x_left, x_right, 400)
-            if log
-            else np.linspace(x_right / 400.0, x_right, 400)
-        )
+        line_x = spaced(x_left or x_right / 400.0, x_right, 400)
         if alone:
             lines.append((line_x, failure_line(model, line_x, probability)))
         elif probability == 0.5:
@@ -116,33 +113,31 @@ def plot_fit(
     )  # fmt: skip
     axes = figure.add_subplot(grid[1, 0])
     above = figure.add_subplot(grid[0, 0], sharex=axes)
-    beside = figure.add_subplot(grid[1, 1], sharey=axes)
+    right_axes = figure.add_subplot(grid[1, 1], sharey=axes)
     if log:
         canvas.logarithmic(axes)
-    canvas.density(figure, axes, x, y, (x_left, x_right), (bottom, top), beside=[beside, above])
+    canvas.density(
+        figure, axes, x, y, (x_left, x_right), (bottom, top), further_axes=[right_axes, above]
+    )
     if log:
         canvas.logarithmic(axes, (1.0, 2.0, 5.0), (1.0, 2.0, 5.0))
     for (_, style, colour, label), (line_x, line) in zip(_LINES, lines, strict=True):
         label += "" if np.isfinite(line).any() else "\n(below zero)"
         axes.plot(line_x, line, style, color=colour, linewidth=1.8, label=label)
     if not binned:
-        axes.set_xlabel(
-            term.label
-            if alone
-            else "expected of the motion: $y$ at 50 % probability of failure [m/s]"
-        )
+        expected_label = "expected of the motion: $y$ at 50 % probability of failure [m/s]"
+        axes.set_xlabel(term.label if alone else expected_label)
     axes.set_ylabel("critical toppling velocity of the block, $y = k_r\\,g/p$ [m/s]")
-    spaced = np.geomspace if log else np.linspace
     canvas.grey_bars(above, x, spaced(x_left, x_right, _BARS + 1))
     above.set_ylabel("blocks", fontsize=8)
     above.tick_params(labelbottom=False, labelsize=8)
-    canvas.grey_bars(beside, y, spaced(bottom, top, _BARS + 1), flat=True)
-    beside.set_xlabel("blocks", fontsize=8)
-    beside.tick_params(labelleft=False, labelsize=8)
-    for edge in (above, beside):
+    canvas.grey_bars(right_axes, y, spaced(bottom, top, _BARS + 1), flat=True)
+    right_axes.set_xlabel("blocks", fontsize=8)
+    right_axes.tick_params(labelleft=False, labelsize=8)
+    for edge in (above, right_axes):
         canvas.open_corner(edge)
-    if fitted is not None:
-        _draw_variance(figure.add_subplot(grid[2, 0], sharex=axes), model, fitted, x, y)
+    if binned:
+        _draw_variance(figure.add_subplot(grid[2, 0], sharex=axes), model, x, y)
         axes.tick_params(labelbottom=False)
     n_events = len(set(table.event_id[shown].tolist()))
     n_censored = int(np.isin(table.status.astype(str), ("below_limit", "no_motion")).sum())
@@ -159,20 +154,19 @@ def plot_fit(
 def _draw_variance(
     axes: Axes,
     model: FragilityModel,
-    fitted: FittedVariance,
     x: NDArray[np.float64],
     y: NDArray[np.float64],
 ) -> None:
     """Draw the variances of y about the line in the bins of the fit, and the fitted variance."""
     order = np.argsort(x, kind="stable")
     bins = Bins.equal_count(x[order])
-    residuals = y[order] - fitted.mean_m_s(model.parameters, bins.x)
+    residuals = y[order] - mean_m_s(model.parameters, bins.x)
     binned = bin_variances(bins, residuals**2, np.ones(x.size))
     log = axes.get_xscale() == "log"
     x_left, x_right = axes.get_xlim()
     line_x = np.geomspace(x_left, x_right, 400) if log else np.linspace(0.0, x_right, 400)
-    line = np.asarray(fitted.variance_m2_s2(model.parameters, line_x))
-    ratio = np.asarray(fitted.variance_m2_s2(model.parameters, binned.centre)) / binned.variance
+    line = np.asarray(variance_m2_s2(model.parameters, line_x))
+    ratio = np.asarray(variance_m2_s2(model.parameters, binned.centre)) / binned.variance
     off = ~((ratio > 0.5) & (ratio < 2.0))
     (dots,) = axes.plot(binned.centre, binned.variance, "o", color="#555555", markersize=5.0)
     (missed,) = axes.plot(binned.centre[off], binned.variance[off], "s", color=canvas.RED)
@@ -187,3 +181,139 @@ def _draw_variance(
     labels = [f"{off.size} bins", "fitted variance", f"{off.sum()} bins missed by a factor above 2"]
     above: Any = {"loc": "lower left", "bbox_to_anchor": (0.0, 1.0), "ncols": 3}
     axes.legend([dots, curve, missed], labels, **above, fontsize=8, frameon=False)
+
+
+_TERMS_A_LINE = 5
+
+
+def equation_lines(model: FragilityModel) -> list[str]:
+    """Return the equation of P with rounded coefficients, and its symbols with their units.
+
+    Args:
+        model: a model of blocks known by p² and k_r.
+
+    Returns:
+        Lines of text with mathtext.
+    """
+    form, coefficients = model.form, model.row.coefficients
+    factor = form.size_factor
+    eta = r"\eta" if factor is None else r"\eta/h"
+
+    def number_of(match: re.Match[str]) -> str:
+        sign, function, name = match[1], match[2], match[3]
+        if name == "sum":
+            return _sum(form, coefficients)
+        value = math.exp(coefficients[name]) if function else coefficients[name]
+        return rounded(value, signed=bool(sign))
+
+    right, where = (
+        re.sub(r"<(\+?)(exp )?([^>]+)>", number_of, template)
+        for template in (form.equation, form.where)
+    )
+    first, *further_lines = right.split("\n")
+    lines = [rf"$P = {model.method.link.formula},\quad {eta} = {first}$"]
+    lines += [rf"${other}$" for other in further_lines]
+    if factor is not None:
+        where = ",\\ ".join(part for part in (f"h = {factor.formula}", where) if part)
+    if where:
+        unit = r"\ \mathrm{[m^2/s^2]}" if r"\sigma^2" in where else ""
+        lines.append(f"${where}{unit}$")
+    symbol = model.term.symbol.replace("π", r"$\pi$").replace("·", " ")
+    units = rf"$x$ = {symbol} [m/s],  $y = k_r\,g/p$ [m/s]"
+    reads_p = factor is not None or r"\ln p" in right
+    lines.append(units + (",  $p$ [1/s]" if reads_p else ""))
+    return lines
+
+
+def rounded(value: float, *, signed: bool = False) -> str:
+    """Return a number with three significant digits as mathtext.
+
+    Args:
+        signed: with its sign and blanks around it, as a further term of a sum.
+    """
+    size = abs(value)
+    text = f"{size:#.3g}".rstrip(".")
+    if "e" in text or 0.0 < size < 1e-3:
+        exponent = math.floor(math.log10(float(f"{size:.2e}")))
+        text = rf"{size / 10.0**exponent:#.3g}\times10^{{{exponent}}}"
+    if signed:
+        return f" {'-' if value < 0.0 else '+'} {text}"
+    return f"-{text}" if value < 0.0 else text
+
+
+def _sum(form: Form, coefficients: Mapping[str, float]) -> str:
+    """Return the sum over the parameters, with a few terms per line."""
+    text = ""
+    count = 0
+    for name, term in zip(form.parameters, form.terms, strict=True):
+        if not term or name not in coefficients:
+            continue
+        if count and count % _TERMS_A_LINE == 0:
+            text += "\n"
+        text += rounded(coefficients[name], signed=count > 0)
+        text += "" if term == "1" else rf"\,{term}"
+        count += 1
+    return text
+
+
+COLOURS = ("#1f4e79", "#d98c1f", "#4c9a6a", "#8c2d4f")
+MARKERS = ("o", "s", "^", "D")
+
+MOST_MODELS = len(COLOURS)
+
+_SCORES = {
+    "log loss": "log_loss_held_out",
+    r"for $k_r \geq 0.05$:": "log_loss_held_out_kr05",
+    "Brier": "brier_held_out",
+}
+
+
+@canvas.in_own_style
+def plot_calibration(
+    models: Mapping[str, CalibrationBins],
+    path: canvas.Out,
+    *,
+    scores: Mapping[str, Mapping[str, float]] | None = None,
+    data: str = "",
+) -> canvas.Picture:
+    """Draw the observed fraction of toppled blocks against the predicted probability.
+
+    Each earthquake was predicted by a fit without it. On the diagonal a model is calibrated.
+
+    Args:
+        models: bins by name of the model, at most four.
+        scores: held-out scores by name of the model, for the legend.
+        data: what the outcomes are, for the title.
+    """
+    canvas.plot_path(path)
+    if not 1 <= len(models) <= MOST_MODELS:
+        raise InputError(f"{len(models)} models: a figure of calibration shows 1 to {MOST_MODELS}")
+    figure = canvas.new_figure(6.2, 7.2)
+    axes, below = figure.subplots(2, 1, sharex=True, height_ratios=[4.0, 1.0])
+    axes.plot([0.0, 1.0], [0.0, 1.0], color="black", lw=0.8, ls=":")
+    for number, (name, bins) in enumerate(models.items()):
+        colour, of_model = COLOURS[number], (scores or {}).get(name, {})
+        texts = [f"{text} {of_model[key]:.3f}" for text, key in _SCORES.items() if key in of_model]
+        # next to each other, so that their intervals can be told apart
+        x = bins.predicted + 0.006 * (number - 0.5 * (len(models) - 1))
+        axes.errorbar(
+            x, bins.observed,
+            yerr=np.clip([bins.observed - bins.low, bins.high - bins.observed], 0.0, None),
+            fmt=MARKERS[number] + "-", ms=4.5, lw=1.0, elinewidth=0.9, capsize=2.0, color=colour,
+            label=as_written(name, 50) + (f" ({', '.join(texts)})" if texts else ""),
+        )  # fmt: skip
+        below.plot(bins.predicted, bins.blocks, MARKERS[number] + "-", ms=3.5, lw=0.9, color=colour)
+    axes.set(xlim=(-0.02, 1.02), ylim=(-0.02, 1.02))
+    axes.set_ylabel("share of blocks that toppled, 95 % interval")
+    below.set_yscale("log")
+    below.set_ylabel("blocks per bin")
+    below.set_xlabel("probability predicted for an earthquake that was left out")
+    canvas.light_grid(axes, below)
+    canvas.legend_below(figure, 1)
+    first = next(iter(models.values()))
+    axes.set_title(
+        f"{int(first.blocks.sum())} blocks under motions of {first.events} earthquakes"
+        + (f"\n{data}" if data else ""),
+        fontsize=10,
+    )
+    return canvas.save_figure(figure, path)

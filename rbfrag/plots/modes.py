@@ -1,9 +1,9 @@
-"""Chart of failure modes over the block angles, with yield accelerations and blocks."""
+"""Failure modes over the block angles, and the yield acceleration over a rotation."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from textwrap import shorten
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -12,18 +12,16 @@ from numpy.typing import ArrayLike, NDArray
 
 from rbfrag.errors import InputError
 from rbfrag.plots import canvas
-from rbfrag.plots.labels import halo
+from rbfrag.plots.canvas import halo, write_near
 from rbfrag.rockmasses.joint_sets import VARIABLES, Realisations, RockMass
 from rbfrag.rockmasses.shaking import FAILS, NO_MODE, ShakenMass
 from rbfrag.solver.block.arrays import BlockArray
+from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.results import FloatArray
-from rbfrag.solver.stability.arrays import (
-    NOTHING,
-    StabilityArray,
-    stability_arrays,
-    water_held_m,
-)
-from rbfrag.solver.stability.modes import LOCKED, MODES, STABLE, UNSTABLE
+from rbfrag.solver.stability.arrays import NOTHING, StabilityArray, stability_arrays, water_held_m
+from rbfrag.solver.stability.modes import LOCKED, MODES, STABLE, UNSTABLE, words_of_mode
+from rbfrag.solver.stability.rotated_yield import BY_MODE
+from rbfrag.solver.stability.single import Stability, stability
 from rbfrag.vocabulary.quantities import QUANTITIES, word_of
 
 if TYPE_CHECKING:
@@ -31,6 +29,7 @@ if TYPE_CHECKING:
     from matplotlib.contour import ContourSet
     from matplotlib.patches import Patch
     from matplotlib.text import Text
+
 
 MOST_POINTS = 300
 """More blocks than these are drawn as a histogram."""
@@ -103,22 +102,77 @@ def plot_modes(
     """
     canvas.plot_path(out)
     on_base = on_base if ended is None else {"s1_m": 1.0, **on_base}
-    planes = {"beta_deg": beta_deg, "phi_deg": phi_deg, "phi_back_deg": phi_back_deg,
-              "back_fracture": back_fracture}  # fmt: skip
+    planes: Any = {"beta_deg": beta_deg, "phi_deg": phi_deg, "phi_back_deg": phi_back_deg,
+                   "back_fracture": back_fracture}  # fmt: skip
     nodes = np.arange(-90.0 + 0.5 * _STEP_DEG, 90.0, _STEP_DEG)
     a1, a3 = np.meshgrid(nodes, nodes)
     is_block = a1 < a3
     # Other angles than a block's are not asked for; their place is taken by one that is.
-    stability = _judged(np.where(is_block, a1, -1.0), np.where(is_block, a3, 1.0), on_base, planes)
-    shown = _pairs(alpha1_deg, alpha3_deg)
+    s1_m = on_base.get("s1_m", 1.0)
+    blocks = _of_one_spacing(np.where(is_block, a1, -1.0), np.where(is_block, a3, 1.0), s1_m)
+    strength: dict[str, Any] = {n: v for n, v in on_base.items() if n not in _OF_CELLS}
+    ending = strength.keys() - {"density_kg_m3"}
+    if ending and "s1_m" not in on_base:
+        raise InputError(
+            f"{min(ending)} requires s1_m, the spacing of the base fractures: its effect depends "
+            "on the weight of the block", fields=("s1_m",),
+        )  # fmt: skip
+    if "water_m" in strength:
+        strength["water_m"] = water_held_m(
+            strength["water_m"], s1_m=s1_m, gamma_deg=blocks.gamma_deg, beta_deg=beta_deg
+        )
+    nan: Any = "propagate" if ending else "raise"  # a block may float
+    stability = stability_arrays(blocks, nan=nan, **planes, **strength)
+    angles = ((), ()) if alpha1_deg is None or alpha3_deg is None else (alpha1_deg, alpha3_deg)
+    shown = [np.asarray(angle, dtype=np.float64) for angle in angles]
+    if shown[0].shape != shown[1].shape or shown[0].ndim != 1:
+        raise InputError(
+            f"alpha1_deg {shown[0].shape} and alpha3_deg {shown[1].shape} must be two lists of "
+            "equal length"
+        )
     figure = canvas.new_figure(6.4 if len(shown[0]) > MOST_POINTS else 5.6, 5.5)
+    from matplotlib.colors import BoundaryNorm, ListedColormap
+    from matplotlib.patches import Patch
+
     axes = figure.add_subplot()
     chart = _Chart(axes, nodes, is_block, stability)
-    ends = _draw_regions(chart) if ended is None else _draw_ends(chart, ended)
+    # unstable, locked and floating regions hatched, and the borders of the modes
+    for code, hatch, _ in _HATCHED:
+        mask = chart.in_state(code)
+        if mask.any():
+            axes.contourf(
+                nodes, nodes, mask.astype(float), levels=[0.5, 1.5], colors="none",
+                hatches=[hatch], zorder=2,
+            ).set_edgecolor("#777777")  # fmt: skip
+    for code in range(len(MODES)):
+        mask = chart.of_mode(code)
+        if mask.any():
+            axes.contour(
+                nodes, nodes, mask.astype(float), levels=[0.5], colors="black", linewidths=1.2,
+                zorder=3,
+            )  # fmt: skip
+    if ended is None:
+        there = is_block & (stability.mode_code != NOTHING)
+        axes.imshow(
+            np.ma.masked_where(~there, stability.mode_code),
+            cmap=ListedColormap([canvas.MODE_COLOURS[mode] for mode in MODES]),
+            norm=BoundaryNorm(np.arange(-0.5, len(MODES)), len(MODES)),
+            alpha=0.30, zorder=1, **_WHOLE_CHART,
+        )  # fmt: skip
+    patches = [] if ended is None else _draw_ends(axes, ended)
     contours = _draw_yields(chart) if ended is None else []
     covered = _draw_blocks(axes, nodes, *shown)
     names = _name_regions(chart, back_fracture, covered)
-    _explain_hatches(chart, ends)
+    patches += [
+        Patch(facecolor="white", edgecolor="#777777", hatch=hatch, label=text)
+        for code, hatch, text in _HATCHED
+        if chart.in_state(code).any()
+    ]
+    if patches:
+        axes.legend(
+            handles=patches, loc="lower right", fontsize=9, frameon=False, handlelength=2.2,
+            handleheight=1.4,
+        ).set_zorder(8)  # fmt: skip
     axes.fill([-90, 90, 90], [-90, -90, 90], color="white", zorder=4, lw=0)
     axes.plot([-90, 90], [-90, 90], color="black", lw=1.0, zorder=5)
     low = -38 if ended is None else -12
@@ -166,26 +220,6 @@ def _of_one_spacing(a1: FloatArray, a3: FloatArray, s1_m: float) -> BlockArray:
     return BlockArray.from_angles(a1, a3, 0.5 * s1_m / np.cos(np.radians(a3)))
 
 
-def _judged(
-    a1: FloatArray, a3: FloatArray, on_base: Mapping[str, float], planes: Mapping[str, Any]
-) -> StabilityArray:
-    s1_m = on_base.get("s1_m", 1.0)
-    blocks = _of_one_spacing(a1, a3, s1_m)
-    strength: dict[str, Any] = {n: v for n, v in on_base.items() if n not in _OF_CELLS}
-    ending = strength.keys() - {"density_kg_m3"}
-    if ending and "s1_m" not in on_base:
-        raise InputError(
-            f"{min(ending)} requires s1_m, the spacing of the base fractures: its effect depends "
-            "on the weight of the block", fields=("s1_m",),
-        )  # fmt: skip
-    if "water_m" in strength:
-        strength["water_m"] = water_held_m(
-            strength["water_m"], s1_m=s1_m, gamma_deg=blocks.gamma_deg, beta_deg=planes["beta_deg"]
-        )
-    nan: Any = "propagate" if ending else "raise"  # a block may float
-    return stability_arrays(blocks, nan=nan, **planes, **strength)
-
-
 def _title(
     phi_deg: float, phi_back_deg: float | None, beta_deg: float, back_fracture: bool,
     on_base: Mapping[str, float], ended: ShakenMass | None,
@@ -209,19 +243,6 @@ def _title(
     )
 
 
-def _pairs(
-    alpha1_deg: ArrayLike | None, alpha3_deg: ArrayLike | None
-) -> tuple[FloatArray, FloatArray]:
-    if alpha1_deg is None or alpha3_deg is None:
-        return np.empty(0), np.empty(0)
-    a1, a3 = np.asarray(alpha1_deg, dtype=np.float64), np.asarray(alpha3_deg, dtype=np.float64)
-    if a1.shape != a3.shape or a1.ndim != 1:
-        raise InputError(
-            f"alpha1_deg {a1.shape} and alpha3_deg {a3.shape} must be two lists of equal length"
-        )
-    return a1, a3
-
-
 class _Chart(NamedTuple):
     """The axes, the angles of the nodes [deg], the mask of blocks, and their stability."""
 
@@ -237,40 +258,7 @@ class _Chart(NamedTuple):
         return np.asarray(self.is_block & (self.stability.state_code == code))
 
 
-def _draw_regions(chart: _Chart) -> list[Patch]:
-    from matplotlib.colors import BoundaryNorm, ListedColormap
-
-    there = chart.is_block & (chart.stability.mode_code != NOTHING)
-    chart.axes.imshow(
-        np.ma.masked_where(~there, chart.stability.mode_code),
-        cmap=ListedColormap([canvas.MODE_COLOURS[mode] for mode in MODES]),
-        norm=BoundaryNorm(np.arange(-0.5, len(MODES)), len(MODES)),
-        alpha=0.30, zorder=1, **_WHOLE_CHART,
-    )  # fmt: skip
-    _draw_borders(chart)
-    return []
-
-
-def _draw_borders(chart: _Chart) -> None:
-    """Hatch unstable, locked and floating regions, and draw the borders of the modes."""
-    axes, nodes = chart.axes, chart.nodes
-    for code, hatch, _ in _HATCHED:
-        mask = chart.in_state(code)
-        if mask.any():
-            axes.contourf(
-                nodes, nodes, mask.astype(float), levels=[0.5, 1.5], colors="none",
-                hatches=[hatch], zorder=2,
-            ).set_edgecolor("#777777")  # fmt: skip
-    for code in range(len(MODES)):
-        mask = chart.of_mode(code)
-        if mask.any():
-            axes.contour(
-                nodes, nodes, mask.astype(float), levels=[0.5], colors="black", linewidths=1.2,
-                zorder=3,
-            )  # fmt: skip
-
-
-def _draw_ends(chart: _Chart, ended: ShakenMass) -> list[Patch]:
+def _draw_ends(axes: Axes, ended: ShakenMass) -> list[Patch]:
     """Colour the cells by the final modes of their blocks; return the legend entries."""
     from matplotlib.colors import to_rgba
     from matplotlib.patches import Patch
@@ -286,8 +274,7 @@ def _draw_ends(chart: _Chart, ended: ShakenMass) -> list[Patch]:
             words = f"{text}: {MODES[code].replace('_', ' ')}"
             patches.append(Patch(facecolor=colour, label=words))
     colours[a1 < a3] = cells
-    chart.axes.imshow(colours, zorder=1, **_WHOLE_CHART)
-    _draw_borders(chart)
+    axes.imshow(colours, zorder=1, **_WHOLE_CHART)
     return patches
 
 
@@ -339,7 +326,7 @@ def _write_values(
 ) -> None:
     """Write contour values at the widest points of their region, without overlap; append them.
 
-    A line without such a place has no value beside it.
+    A line without such a place has no value next to it.
     """
     from scipy.ndimage import distance_transform_edt
 
@@ -368,21 +355,6 @@ def _write_values(
                 break
         else:
             value.remove()
-
-
-def _explain_hatches(chart: _Chart, patches: list[Patch]) -> None:
-    from matplotlib.patches import Patch
-
-    patches += [
-        Patch(facecolor="white", edgecolor="#777777", hatch=hatch, label=text)
-        for code, hatch, text in _HATCHED
-        if chart.in_state(code).any()
-    ]
-    if patches:
-        chart.axes.legend(
-            handles=patches, loc="lower right", fontsize=9, frameon=False, handlelength=2.2,
-            handleheight=1.4,
-        ).set_zorder(8)  # fmt: skip
 
 
 def _widest_point(region: NDArray[np.bool_], text: str = "") -> tuple[int, int] | None:
@@ -427,3 +399,132 @@ def _draw_blocks(
         cells, ax=axes, label=f"blocks per cell of {CELL_DEG:g}° x {CELL_DEG:g}°", shrink=0.8
     )
     return covered
+
+
+SHARES = (0.0, 0.5, 1.0)
+"""Shares of the rotation by which the back plane turns, where nothing else is said."""
+
+_ROTATIONS = 721
+_LINES = ("-", "--", ":", "-.")
+
+
+class YieldLine(NamedTuple):
+    """Yield acceleration against rotation for one fraction.
+
+    Args:
+        share: by how much of the block's rotation the back plane turns.
+        at_rest_g: yield at rest [g].
+        least_g: least yield [g].
+        least_deg: rotation at which it is [deg].
+        end_g: yield at the end of the range [g].
+        end_deg: end of the range [deg].
+    """
+
+    share: float
+    at_rest_g: float
+    least_g: float
+    least_deg: float
+    end_g: float
+    end_deg: float
+
+
+@canvas.in_own_style
+def plot_rotation(
+    block: Block,
+    out: canvas.Out = None,
+    *,
+    beta_deg: float,
+    phi_deg: float,
+    phi_back_deg: float | None = None,
+    back_follows: Sequence[float] = SHARES,
+) -> canvas.Picture:
+    """Draw the yield acceleration of a slump or a confined topple against its rotation.
+
+    The figures 3.20a, 3.20b and 3.21 of Gibson's dissertation, for any block.
+
+    Args:
+        block: the block.
+        out: file to write (.png, .pdf, .svg); None for a picture that a notebook shows.
+        beta_deg: dip of the base, out of the slope positive [deg].
+        phi_deg: friction angle of the base [deg].
+        phi_back_deg: friction angle of the back plane [deg]; None for that of the base.
+        back_follows: shares of the rotation by which the back plane turns with the block, from 0
+            to 1; at most four.
+
+    Raises:
+        InputError: a block of another mode, a share out of range, too many of them.
+    """
+    canvas.plot_path(out)
+    at_rest, curves = _curves(block, beta_deg, phi_deg, phi_back_deg, back_follows)
+    figure = canvas.new_figure(7.0, 4.6)
+    axes = figure.add_subplot()
+    colours = (canvas.MODE_COLOURS[at_rest.mode], canvas.BLUE, canvas.RED, canvas.ROCK)
+    for (share, theta, k), style, colour in zip(curves, _LINES, colours, strict=False):
+        shown = np.where(np.isfinite(k), k, np.nan)
+        label = {0.0: "the back plane stays", 1.0: "it turns with the block"}.get(
+            share, f"it turns by {share:g} of the rotation"
+        )
+        axes.plot(theta, shown, style, color=colour, lw=1.8, label=label)
+        least = int(np.argmin(k))
+        if 0 < least < k.size - 1:
+            axes.plot(theta[least], k[least], "o", color=colour, ms=4)
+    axes.axhline(at_rest.ky, color="black", lw=0.8, alpha=0.6)
+    write_near(
+        axes, "$k_y$, sliding", (1.0, at_rest.ky), (-4, 3), xycoords=("axes fraction", "data"),
+        fontsize=8,
+    )  # fmt: skip
+    axes.set_xlim(0.0, None)
+    axes.margins(y=0.12)
+    axes.set_xlabel(f"rotation of the block [deg], until {BY_MODE[at_rest.mode].end}")
+    axes.set_ylabel("yield acceleration [g]")
+    canvas.light_grid(axes)
+    axes.legend(fontsize=8.5, framealpha=0.9)
+    axes.set_title(
+        f"{canvas.mode_title(at_rest.mode)}: $\\alpha_1$ = {block.alpha1_deg:.4g}, $\\alpha_3$ = "
+        f"{block.alpha3_deg:.4g}, $\\beta$ = {beta_deg:g}, $\\varphi_1$ = {phi_deg:g}, "
+        f"$\\varphi_2$ = {at_rest.phi_back_deg:g} deg",
+        fontsize=10,
+    )
+    return canvas.save_figure(figure, out)
+
+
+def yield_lines(
+    block: Block,
+    *,
+    beta_deg: float,
+    phi_deg: float,
+    phi_back_deg: float | None = None,
+    back_follows: Sequence[float] = SHARES,
+) -> tuple[YieldLine, ...]:
+    """Return the numbers of the figure; arguments as for :func:`plot_rotation`."""
+    lines = []
+    for share, theta, k in _curves(block, beta_deg, phi_deg, phi_back_deg, back_follows)[1]:
+        least = int(np.argmin(k))
+        numbers = (k[0], k[least], theta[least], k[-1], theta[-1])
+        lines.append(YieldLine(share, *map(float, numbers)))
+    return tuple(lines)
+
+
+def _curves(
+    block: Block,
+    beta_deg: float,
+    phi_deg: float,
+    phi_back_deg: float | None,
+    shares: Sequence[float],
+) -> tuple[Stability, list[tuple[float, FloatArray, FloatArray]]]:
+    """Return the stability, and rotations [deg] and yields [g] for each fraction."""
+    planes = {"beta_deg": beta_deg, "phi_deg": phi_deg, "phi_back_deg": phi_back_deg}
+    at_rest = stability(block, **planes)  # type: ignore[arg-type]
+    if at_rest.mode not in BY_MODE:
+        raise InputError(
+            f"the mode of the block is {words_of_mode(at_rest.mode)}: the yield over a rotation is "
+            f"that of {' or '.join(map(words_of_mode, BY_MODE))}, against a back plane"
+        )
+    if not 1 <= len(shares) <= len(_LINES):
+        raise InputError(f"{len(shares)} fractions of the rotation: give 1 to {len(_LINES)}")
+    law = BY_MODE[at_rest.mode]
+    curves = []
+    for share in shares:
+        theta = np.linspace(0.0, law.limit_deg(block, back_follows=share), _ROTATIONS)
+        curves.append((share, theta, law.yield_g(block, theta, **planes, back_follows=share)))
+    return at_rest, curves

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from importlib import import_module
 from os import PathLike
-from typing import TYPE_CHECKING, Any, Protocol, TypedDict, Unpack
+from typing import TYPE_CHECKING, Any, Unpack
 
 from rbfrag.db.engine import opened_database
 from rbfrag.db.models import load_model
@@ -15,45 +15,44 @@ from rbfrag.errors import InputError
 from rbfrag.fragility.measures import MEASURES, spectral
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.fragility.model_selection import find_model, stored_row
+from rbfrag.fragility.prediction import Prediction
 from rbfrag.motions.polarity import Polarity
 from rbfrag.motions.readers import MotionLike, as_motion
 from rbfrag.plots.canvas import Out, Picture, plot_path
 from rbfrag.question.fields import BlockKeywords, MeasureFields, RangeFields
 from rbfrag.question.keywords import LEVEL, model_for, parts_of
-from rbfrag.question.question import described
+from rbfrag.question.nominal import described
+from rbfrag.results.diagnostic import diagnostics
 from rbfrag.vocabulary.quantities import BLOCKS, INTENSITY, RANGE
 
 if TYPE_CHECKING:
     from rbfrag.plots.hazard import plot_contribution as hazard
-    from rbfrag.plots.losses import plot_losses as losses
+    from rbfrag.plots.hazard import plot_losses as losses
+    from rbfrag.plots.hazard import plot_survival as survival
     from rbfrag.plots.modes import plot_modes as modes
-    from rbfrag.plots.rotation import plot_rotation as rotation
+    from rbfrag.plots.modes import plot_rotation as rotation
     from rbfrag.plots.spectrum import plot_spectrum as spectrum
-    from rbfrag.plots.survival import plot_survival as survival
-    from rbfrag.rockmasses.joint_sets import Realisations
-    from rbfrag.rockmasses.shaking import ShakenMass
 
 __all__ = (
-    "Picture", "calibration", "chart", "curve", "fit", "hazard", "losses", "modes", "response",
-    "rockmass", "rotation", "sensitivity", "shakemap", "spectrum", "survival", "vertical",
+    "Picture", "calibration", "chart", "critical", "curve", "fit", "hazard", "losses", "modes",
+    "response", "rockmass", "rotation", "sensitivity", "shakemap", "spectrum", "survival",
+    "vertical",
 )  # fmt: skip
 
 _DRAWN_THERE = {
-    "hazard": "plot_contribution",
-    "losses": "plot_losses",
-    "modes": "plot_modes",
-    "rotation": "plot_rotation",
-    "spectrum": "plot_spectrum",
-    "survival": "plot_survival",
-}
-"""Figures of what is given alone: each in the file of its name, loaded when it is asked for."""
+    "hazard": ("hazard", "plot_contribution"), "losses": ("hazard", "plot_losses"),
+    "modes": ("modes", "plot_modes"), "rotation": ("modes", "plot_rotation"),
+    "spectrum": ("spectrum", "plot_spectrum"), "survival": ("hazard", "plot_survival"),
+}  # fmt: skip
+"""File and name of each figure of an answer or a motion, loaded when first used."""
 
 
 def __getattr__(name: str) -> Any:
     """Load the figure of a file (PEP 562)."""
     if name not in _DRAWN_THERE:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(import_module(f"rbfrag.plots.{name}"), _DRAWN_THERE[name])
+    file, function = _DRAWN_THERE[name]
+    return getattr(import_module(f"rbfrag.plots.{file}"), function)
 
 
 def __dir__() -> list[str]:
@@ -76,10 +75,9 @@ def fit(
         log: logarithmic axes.
         db: the database: a path or URL; None for the default.
     """
-    from rbfrag.fragility.fit.check import source_of
     from rbfrag.fragility.fit.data import fit_data
+    from rbfrag.fragility.fit.stored import source_of
     from rbfrag.fragility.methods import method_named
-    from rbfrag.fragility.model import FragilityModel
     from rbfrag.plots.fit import plot_fit
 
     plot_path(out)
@@ -131,7 +129,7 @@ def chart(
     measures = ["pgv_m_s"] if model is None else MEASURES
     chosen = find_model(model, measures, db, rotation_deg=rotation)
     if chosen.method.block.kind != TOPPLING_BLOCK.kind:
-        from rbfrag.plots.kind_chart import plot_kind_chart
+        from rbfrag.plots.chart import plot_kind_chart
 
         size = next((n for n in chosen.method.block.names if not n.startswith("k")), "p2")
         size = "p2" if size == "displacement_m" else size
@@ -159,7 +157,7 @@ def planes(
         base: plane of the base.
         back: plane of the back.
     """
-    from rbfrag.plots.blocks.stereonet import plot_planes
+    from rbfrag.plots.block import plot_planes
     from rbfrag.solver.block.planes import plane_of
 
     if face is None or base is None:
@@ -173,21 +171,13 @@ VARIED = {"pgv": "pgv_m_s", "pga": "pga_g", "pgd": "pgd_m", "sa10": "sa10_g"}
 """What a curve may run over."""
 
 
-class _OneCurve(TypedDict, total=False):
-    """Keywords of the held measures and of the output of a curve."""
+class FragilityCurveKeywords(
+    BlockKeywords[float | None], MeasureFields[float | None], RangeFields, total=False
+):
+    """Keywords of a fragility curve: block, held measures and model."""
 
     out: Out
     sa_g: Mapping[float, float] | None
-
-
-class FragilityCurveKeywords(
-    BlockKeywords[float | None],
-    MeasureFields[float | None],
-    RangeFields,
-    _OneCurve,
-    total=False,
-):
-    """Keywords of a fragility curve: block, held measures and model."""
 
 
 def curve(
@@ -217,7 +207,7 @@ def curve(
 
     numbers = [number for number in (p2, kr) if number is not None]
     block, held, answering, drawing = parts_of(
-        numbers, question, BLOCKS, INTENSITY, RANGE, _OneCurve.__optional_keys__
+        numbers, question, BLOCKS, INTENSITY, RANGE, ("out", "sa_g")
     )
     held |= spectral(drawing.get("sa_g") or {})
     kind = block.pop("kind", None)
@@ -242,7 +232,7 @@ def curve(
     return replace(picture, warnings=blocks.remarks)
 
 
-def sensitivity(
+def critical(
     out: Out = None, *, suite: str | None = None, db: str | PathLike[str] | None = None
 ) -> Picture:
     """Draw critical k_r/PGA against the frequency ratio ω_m/p, with the lines of single pulses.
@@ -252,12 +242,38 @@ def sensitivity(
         suite: motions of this suite only.
         db: as for :func:`fit`.
     """
-    from rbfrag.plots.critical_strength import plot_sensitivity
+    from rbfrag.plots.critical_strength import plot_critical
 
     with opened_database(db, read_only=True) as engine, engine.connect() as connection:
         table = combination_table(connection, suite=suite)
     data = "without vertical motion" + (f", suite {suite}" if suite else "")
-    return plot_sensitivity(table, out, data=data)
+    return plot_critical(table, out, data=data)
+
+
+def sensitivity(out: Out = None, /, **question: Any) -> Picture:
+    """Draw P of a block at usual errors of measurement, and its distribution over the draws.
+
+    Args:
+        out: as for :func:`fit`.
+        question: the keywords of :func:`rbfrag.predict` for a block given by its geometry; the
+            distribution is drawn with standard deviations of measured fields.
+    """
+    from rbfrag.plots.sensitivity import plot_sensitivity
+    from rbfrag.question.nominal import MEASURED
+    from rbfrag.question.question import predict
+
+    nominal = {name: value for name, value in question.items() if name not in MEASURED}
+    answer = (
+        predict(**nominal, gmm_sigma=0.0, sensitivity=True)
+        if "rjb_km" in nominal
+        else predict(**nominal, sensitivity=True)
+    )
+    if not isinstance(answer, Prediction):
+        raise InputError("the sensitivity is that of a single block: give single numbers")
+    measured = predict(**question) if MEASURED.intersection(question) else None
+    assert measured is None or isinstance(measured, Prediction)
+    picture = plot_sensitivity(answer, measured, out)
+    return replace(picture, warnings=diagnostics((measured or answer).warnings))
 
 
 def vertical(
@@ -278,8 +294,7 @@ def vertical(
         with_it = combination_table(
             connection, suite=suite, vertical="with", numerics_version=version
         )
-    pairs = vertical_pairs(without, with_it)
-    return plot_vertical(pairs, out)
+    return plot_vertical(vertical_pairs(without, with_it), out)
 
 
 def calibration(
@@ -298,16 +313,15 @@ def calibration(
         seed: seed of the draws of earthquakes.
         db: as for :func:`fit`.
     """
-    from rbfrag.fragility.fit.check import held_out_of
-    from rbfrag.plots.calibration import plot_calibration
+    from rbfrag.fragility.fit.stored import held_out_of
+    from rbfrag.plots.fit import plot_calibration
 
     plot_path(out)
     with opened_database(db, read_only=True) as engine, engine.connect() as connection:
         names: Sequence[str | None] = models or [None]
         answers = [held_out_of(connection, name, seed=seed) for name in names]
-    bins, scores = (
-        {answer.name: getattr(answer, of) for answer in answers} for of in ("bins", "scores")
-    )
+    bins = {answer.name: answer.bins for answer in answers}
+    scores = {answer.name: answer.scores for answer in answers}
     return plot_calibration(bins, out, scores=scores, data=answers[0].outcomes)
 
 
@@ -341,18 +355,8 @@ def response(
     return plot_response(shaken, out, p2=p2, kr=kr, reverse=reverse, title=ground.label)
 
 
-class _OfRockMass(Protocol):
-    """Answer of :func:`rbfrag.rockmass`."""
-
-    @property
-    def blocks(self) -> Realisations: ...
-    @property
-    def outcomes(self) -> ShakenMass | None: ...
-    @property
-    def level(self) -> float: ...
-
-
-def rockmass(answer: _OfRockMass, out: Out = None) -> Picture:
+# A rock mass and a map are answers of packages that this one does not import.
+def rockmass(answer: Any, out: Out = None) -> Picture:
     """Draw the cumulative counts of blocks against PGA by mode; with a motion those that fail.
 
     Args:
@@ -361,26 +365,12 @@ def rockmass(answer: _OfRockMass, out: Out = None) -> Picture:
     """
     from rbfrag.plots.rockmass import plot_failures, plot_rockmass
 
-    ran = answer.outcomes
-    if ran is None:
+    if answer.outcomes is None:
         return plot_rockmass(answer.blocks, out)
-    return plot_failures(ran, out, level=answer.level)
+    return plot_failures(answer.outcomes, out, level=answer.level)
 
 
-class _OfMap(Protocol):
-    """Answer of :func:`rbfrag.shakemap`."""
-
-    @property
-    def columns(self) -> Mapping[str, Any]: ...
-    @property
-    def title(self) -> str: ...
-    @property
-    def epicentre(self) -> tuple[float, float] | None: ...
-    @property
-    def shape(self) -> tuple[int, int] | None: ...
-
-
-def shakemap(answer: _OfMap, out: Out = None) -> Picture:
+def shakemap(answer: Any, out: Out = None) -> Picture:
     """Draw the map of probabilities.
 
     Args:

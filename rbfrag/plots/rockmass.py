@@ -3,21 +3,23 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from rbfrag.plots import canvas
-from rbfrag.plots.labels import as_written, write_near
+from rbfrag.plots.canvas import as_written, write_near
 from rbfrag.results.numbers import exact_percent, percent
 from rbfrag.rockmasses.counts import (
+    ModeFailures,
+    ScaleFailures,
     crossings,
     cumulative_counts,
+    failures,
     mode_counts,
     sorted_yields,
 )
-from rbfrag.rockmasses.failures import ModeFailures, ScaleFailures, failures
 from rbfrag.rockmasses.joint_sets import Realisations
 from rbfrag.rockmasses.shaking import ShakenMass
 from rbfrag.solver.stability.modes import ModeName
@@ -89,7 +91,9 @@ def plot_rockmass(realisations: Realisations, path: canvas.Out) -> canvas.Pictur
     _name_bars(bars, present)
     bars.set_ylim(0.0, 1.12 * max(shares))
     bars.set_ylabel("share of the blocks [%]")
-    figure.suptitle(_title(realisations), fontsize=10)
+    n, blocks = realisations.n, realisations.n_blocks
+    missing = "" if blocks == n else f"; {n - blocks} of {n} realisations are no block"
+    figure.suptitle(f"{blocks} blocks of a rock mass{missing}", fontsize=10)
     return canvas.save_figure(figure, path)
 
 
@@ -102,20 +106,17 @@ def _name_bars(axes: Axes, modes: Sequence[ModeName | None]) -> None:
     canvas.open_corner(axes)
 
 
-def _title(realisations: Realisations) -> str:
-    n, blocks = realisations.n, realisations.n_blocks
-    text = f"{blocks} blocks of a rock mass"
-    return text if blocks == n else f"{text}; {n - blocks} of {n} realisations are no block"
+_UNKNOWN = "#c9a227"
 
-
-PARTS = (
-    ("fails", "fails", "#a3262a"),
-    ("unstable", "fails at rest", "#5b1a4e"),
-    ("open", "not known", "#c9a227"),
-    ("stays", "moves, and stays", "#8fb3d1"),
-    ("at_rest", "does not move", "#d9dde0"),
-)
-"""Parts of a bar: what they are made of, what they are called, and their colours."""
+PARTS: tuple[tuple[str, str, Callable[[ModeFailures], int]], ...] = (
+    ("fails", "#a3262a", lambda result: result.outcomes["fails"]),
+    ("fails at rest", "#5b1a4e", lambda result: result.outcomes["unstable"]),
+    ("not known", _UNKNOWN, lambda result: result.open),
+    ("moves, and stays", "#8fb3d1", lambda result: result.outcomes["stays"]),
+    ("does not move", "#d9dde0",
+     lambda result: result.outcomes["at_rest"] + result.outcomes["locked"]),
+)  # fmt: skip
+"""Parts of a bar: their labels, colours, and numbers of blocks."""
 
 
 @canvas.in_own_style
@@ -141,7 +142,14 @@ def plot_failures(shaken: ShakenMass, path: canvas.Out, *, level: float = 0.95) 
         bars = figure.subplots()
     _draw_bars(bars, bars_of)
     letters = min(TITLE_WIDTH, int(_LETTERS_AN_INCH * figure.get_figwidth()))
-    figure.suptitle(_shaken_title(shaken, letters), fontsize=10)
+    limits = shaken.limits
+    turned = "" if limits.rotation_deg is None else f"by more than {limits.rotation_deg:g}° or "
+    about = f"{shaken.shaking.motion.label}: {shaken.realisations.n_blocks:,} blocks of a rock mass"
+    rule = (
+        f"a slide fails beyond {limits.displacement_m:g} m, "
+        f"a block that turns {turned}past recovery"
+    )
+    figure.suptitle(f"{as_written(about, letters)}\n{as_written(rule, letters)}", fontsize=10)
     return canvas.save_figure(figure, path)
 
 
@@ -153,16 +161,12 @@ def _draw_curves(axes: Axes, by_scale: Sequence[ScaleFailures], level: float) ->
     )
     for mode in by_scale[0].modes:
         of_mode = [result.modes[mode] for result in by_scale]
-        label, line, colour = (
-            canvas.mode_title(mode),
-            canvas.MODE_LINES[mode],
-            canvas.MODE_COLOURS[mode],
-        )
-        _draw_share(axes, scales, of_mode, label, line, colour, 1.8)
+        line, colour = canvas.MODE_LINES[mode], canvas.MODE_COLOURS[mode]
+        _draw_share(axes, scales, of_mode, canvas.mode_title(mode), line, colour, 1.8)
     unknown = np.array([result.total.open_of_all for result in by_scale])
     if unknown.any():
         fails = np.array([result.total.of_all.value for result in by_scale])
-        axes.fill_between(scales, 100.0 * fails, 100.0 * (fails + unknown), color=PARTS[2][2],
+        axes.fill_between(scales, 100.0 * fails, 100.0 * (fails + unknown), color=_UNKNOWN,
                           alpha=0.3, lw=0, label="not known")  # fmt: skip
     axes.set_xlim(0.0, 1.02 * scales[-1])
     axes.set_ylim(bottom=0.0)
@@ -194,8 +198,8 @@ def _draw_bars(axes: Axes, of_scale: ScaleFailures) -> None:
     ]
     at = np.arange(len(rows))
     bottom = np.zeros(len(rows))
-    for part, label, colour in PARTS:
-        heights = np.array([100.0 * _part(result, part) / result.count for _, result in rows])
+    for label, colour, number_of in PARTS:
+        heights = np.array([100.0 * number_of(result) / result.count for _, result in rows])
         if not heights.any():
             continue
         axes.bar(at, heights, width=0.7, bottom=bottom, color=colour, label=label)
@@ -210,22 +214,3 @@ def _draw_bars(axes: Axes, of_scale: ScaleFailures) -> None:
     axes.set_ylabel("share of the blocks of a mode [%]")
     axes.set_title(f"motion times {of_scale.scale:g}, PGA {of_scale.pga_g:.3g} g", fontsize=9)
     axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.1), ncols=2, fontsize=8, frameon=False)
-
-
-def _part(result: ModeFailures, part: str) -> int:
-    if part == "open":
-        return result.open
-    if part == "at_rest":
-        return result.outcomes["at_rest"] + result.outcomes["locked"]
-    return result.outcomes[part]
-
-
-def _shaken_title(shaken: ShakenMass, letters: int) -> str:
-    limits = shaken.limits
-    turned = "" if limits.rotation_deg is None else f"by more than {limits.rotation_deg:g}° or "
-    about = f"{shaken.shaking.motion.label}: {shaken.realisations.n_blocks:,} blocks of a rock mass"
-    rule = (
-        f"a slide fails beyond {limits.displacement_m:g} m, "
-        f"a block that turns {turned}past recovery"
-    )
-    return f"{as_written(about, letters)}\n{as_written(rule, letters)}"

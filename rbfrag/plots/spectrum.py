@@ -14,7 +14,7 @@ from rbfrag.motions.readers import MotionLike, as_motion
 from rbfrag.motions.toppling_spectrum import toppling_spectrum
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.plots import canvas
-from rbfrag.plots.labels import as_written
+from rbfrag.plots.canvas import as_written
 
 if TYPE_CHECKING:
     pass

@@ -13,8 +13,6 @@ from typing import Any, NamedTuple
 
 from rbfrag.fragility.method import ArrayNamespace
 
-MECHANISMS = ("unspecified", "strike-slip", "normal", "reverse")
-
 
 class _Coefficients(NamedTuple):
     """Coefficients of one intensity measure; e0 holds a value for each mechanism."""

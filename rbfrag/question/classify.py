@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from rbfrag.errors import InputError
 from rbfrag.fragility.model_selection import block_of, check_numbers
 from rbfrag.question.shape_validation import (
+    ANGLE_MISSING,
     BOND,
     DENSITY_NOTE,
     DRAINED_NOTE,
@@ -23,15 +24,19 @@ from rbfrag.question.shape_validation import (
     LEAST_M,
     NO_MODEL,
     OF_A_SHAPE,
+    REJECTED,
     SHAPES,
     SIDES_AND_PLANES,
     SMALL_BLOCK,
+    UNSTABLE,
     WAYS,
+    IssueCollector,
     ModeShapes,
     check_lengths,
     check_ranges,
     check_size,
     numbers_of_shape,
+    reject_parameters,
     shape_among,
     size_questions,
 )
@@ -57,8 +62,6 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-"""Fields that say of a block what its shape would."""
-
 
 class Group(NamedTuple):
     """Blocks of one kind, with the inputs of its model.
@@ -81,11 +84,13 @@ class InvalidBlocks(NamedTuple):
         places: where they stand among all blocks, shape (m,).
         text: the reason, with the names of values in braces.
         values: these values, numbers or arrays of shape (m,).
+        state: which of ``STATES`` of :mod:`rbfrag.question.shape_validation` they are in.
     """
 
     indices: NDArray[np.intp]
     text: str
     values: Mapping[str, Any]
+    state: str = REJECTED
 
     def texts(self) -> NDArray[np.object_]:
         """Return the reason for each block."""
@@ -151,35 +156,6 @@ def numbers_in(columns: Mapping[str, Any]) -> dict[str, Any]:
     }
 
 
-def taken_as_medians(inputs: Mapping[str, Any]) -> tuple[dict[str, Any], tuple[Diagnostic, ...]]:
-    """Return fields without standard deviations, and a warning where there are any.
-
-    Args:
-        inputs: fields of blocks, numbers or arrays.
-    """
-    sigmas = [name for name in inputs if name.endswith("_sigma")]
-    ignored = [name for name in sigmas if any(_listed_numbers(inputs[name]))]
-    medians = {name: value for name, value in inputs.items() if name not in sigmas}
-    if not ignored:
-        return medians, ()
-    text = (
-        f"{' and '.join(ignored)} of the blocks are not integrated here: each block is assumed to "
-        "be its median (predict, survival and losses integrate)"
-    )
-    return medians, (Diagnostic(text, "medians_assumed", fields=tuple(ignored)),)
-
-
-def _listed_numbers(value: Any) -> list[float]:
-    numbers = value.ravel().tolist() if hasattr(value, "ravel") else value
-    return [item for item in (numbers if isinstance(numbers, list) else [numbers]) if item == item]
-
-
-FREE_NEEDS_NONE = (
-    "; for a free-standing rectangular block no friction angle is required with "
-    f"kind={FREE_STANDING!r}"
-)
-
-
 class Shape(NamedTuple):
     """Geometry of a block, and the planes that bound it.
 
@@ -200,8 +176,12 @@ class Shape(NamedTuple):
         """Return the geometry; reject a block without a friction angle."""
         if "phi_deg" in self.planes:
             return self
-        stands_free = self.is_rectangle and not self.planes.get("back_fracture", True)
-        text = f"{FRICTION_MISSING}{FREE_NEEDS_NONE if stands_free else ''}"
+        text = FRICTION_MISSING
+        if self.is_rectangle and not self.planes.get("back_fracture", True):
+            text += (
+                "; for a free-standing rectangular block no friction angle is required with "
+                f"kind={FREE_STANDING!r}"
+            )
         raise InputError(text, fields=("phi_deg", "kind"))
 
     def rough(self) -> dict[str, Any]:
@@ -227,36 +207,36 @@ def shape_of(inputs: Mapping[str, Any]) -> Shape | None:
     names = shape_among(inputs)
     if names is None:
         return None
-    sides = {name: number(inputs[name], name, "a number") for name in names}
-    planes = {name: value for name, value in inputs.items() if name in IS_PLANE}
-    plane_values = {
-        name: number(planes[name], name, "a number") for name in PLANES if name in planes
+    values = {
+        name: number(inputs[name], name, "a number")
+        for name in (*names, *PLANES, *BOND, *JOINT)
+        if name in inputs
     }
     issues = _ScalarIssues()
-    check_ranges({**sides, **plane_values}, issues)
-    check_lengths(sides, issues)
-    block = getattr(Block, SHAPES[names])(*sides.values()) if names else inputs["block"]
+    check_ranges(values, issues)
+    check_lengths(values, issues)
+    sides = (values[name] for name in names)
+    block = getattr(Block, SHAPES[names])(*sides) if names else inputs["block"]
     if not isinstance(block, Block):
         raise InputError(
             f"block = {block!r:.60}: use Block.rectangle, .from_angles, .from_fractures or "
             ".from_polygon"
         )
     is_rectangle = block.is_parallelogram and block.tan_alpha1 == -block.tan_alpha3
+    planes = {name: values.get(name, value) for name, value in inputs.items() if name in IS_PLANE}
     if is_rectangle:
         planes.setdefault("beta_deg", 0.0)
     for name in ("beta_deg", "phi_deg"):
         if name not in planes and not is_rectangle:
-            raise InputError(f"{name}{FRICTION_MISSING[7:]}", fields=(name,))
-    bond = bond_of(planes)
+            raise InputError(f"{name}{ANGLE_MISSING}", fields=(name,))
     if planes.get("drainage") and "water_m" not in planes:
         raise InputError(DRAINS_NOTHING, fields=("drainage", "water_m"))
-    wet = bond.get("water_m") and not is_drained(planes.get("drainage"))
-    needed = wet or any(bond.get(name) for name in ("cohesion_pa", "jrc"))
-    if needed and "density_kg_m3" not in bond:
-        bond["density_kg_m3"] = ROCK_KG_M3
+    wet = planes.get("water_m") and not is_drained(planes.get("drainage"))
+    needed = wet or any(planes.get(name) for name in ("cohesion_pa", "jrc"))
+    if needed and "density_kg_m3" not in planes:
+        planes["density_kg_m3"] = ROCK_KG_M3
         issues.remarks.append(DENSITY_NOTE)
-    remarks = (*off_section, *issues.remarks)
-    return Shape(block, {**planes, **plane_values, **bond}, is_rectangle, remarks)
+    return Shape(block, planes, is_rectangle, (*off_section, *issues.remarks))
 
 
 def sectioned(inputs: Mapping[str, Any]) -> tuple[Mapping[str, Any], tuple[Diagnostic, ...]]:
@@ -266,14 +246,6 @@ def sectioned(inputs: Mapping[str, Any]) -> tuple[Mapping[str, Any], tuple[Diagn
     from rbfrag.question.sections import in_section
 
     return in_section(inputs)
-
-
-def bond_of(inputs: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the joint properties that are given; reject values outside their range."""
-    names = (*BOND, *JOINT)
-    bond = {name: number(inputs[name], name, "a number") for name in names if name in inputs}
-    check_ranges(bond, _ScalarIssues())
-    return bond
 
 
 def on_planes(inputs: Mapping[str, Any]) -> Shape:
@@ -303,28 +275,33 @@ def without_kv(inputs: Mapping[str, Any]) -> dict[str, Any]:
     return {name: value for name, value in inputs.items() if name != "kv"}
 
 
-class _FailsAtRest(Exception):
-    """A single block fails without an earthquake; the text is the reason."""
-
-
 class _ScalarIssues:
-    """Raises the first reason to reject a single block, together with warnings about its angles."""
+    """Raises the first reason to reject a single block, together with warnings about its angles.
 
-    def __init__(self, suspicious: Collection[str] = ()) -> None:
+    Args:
+        suspicious: these warnings.
+        keeps_remarks: False where the warnings are not needed.
+    """
+
+    def __init__(self, suspicious: Collection[str] = (), *, keeps_remarks: bool = True) -> None:
         self.remarks: list[Diagnostic] = []
-        self._suspicious = suspicious
+        self.state = self.reason = ""
+        """Which of ``STATES`` a rejected block is in, and why, without the other warnings."""
+        self._suspicious, self._keeps_remarks = suspicious, keeps_remarks
 
-    def reject(self, holds: Any, text: str, *fields: str, **values: Any) -> None:
+    def reject(
+        self, holds: Any, text: str, /, *fields: str, state: str = REJECTED, **values: Any
+    ) -> None:
         if holds:
-            text = "; ".join((text.format(**values), *self._suspicious))
+            self.state, self.reason = state, text.format(**values)
+            text = "; ".join((self.reason, *self._suspicious))
             raise InputError(text, fields=(*fields, *PLANES))
 
-    def unstable(self, holds: Any, text: str, **values: Any) -> None:
-        if holds:
-            raise _FailsAtRest(text.format(**values))
+    def unstable(self, holds: Any, text: str, /, **values: Any) -> None:
+        self.reject(holds, text, state=UNSTABLE, **values)
 
-    def remark(self, holds: Any, text: Diagnostic, **values: Any) -> None:
-        if holds:
+    def remark(self, holds: Any, text: Diagnostic, /, **values: Any) -> None:
+        if holds and self._keeps_remarks:
             self.remarks.append(text.replaced(text=text.format(**values)) if values else text)
 
 
@@ -377,42 +354,15 @@ def classify_block(
         if kind in (None, block.kind):  # what another kind reads the choice of its model says
             check_numbers(block.kind, block, inputs)
         return Blocks((Group(kind, inputs),), (*unread, *size_questions(inputs.get("p2"))))
-    from rbfrag.solver.stability.residual_strength import after_first_slip
-    from rbfrag.solver.stability.single import judged, push_of
-
-    if numbers := [name for name in NUMBERS if name in inputs]:
-        raise InputError(
-            f"{numbers[0]} cannot be combined with {(shape_among(inputs) or ('a geometry',))[0]}: "
-            "give one description of the block",
-            fields=(numbers[0], *SIDES_AND_PLANES),
-        )
+    reject_parameters(inputs, shape_among(inputs) or ())
     options = {name: value for name, value in inputs.items() if name not in IS_SHAPE}
     displacement_m = options.pop("displacement_m", None)
     requested = requested_kind(kind, options)
-    backed = shape.planes.get("back_fracture", True)
     taken = "phi_deg" not in shape.planes
     if taken and (displacement_m is not None or (requested and requested.mode != "topple")):
         shape.require_friction()
-    planes = shape.rough()
-    if requested is not None and requested.free_standing:
-        planes["back_fracture"] = False
-    before_slip = {name: planes[name] for name in planes if name != "phi_residual_deg"}
-    finding, on, _ = judged(shape.block, **before_slip)
     issues = _ScalarIssues(shape.remarks)
-    if finding.k > 0.0:
-        planes, after = after_first_slip(shape.block, planes)
-        if after:
-            issues.remarks += after
-            finding, on, _ = judged(shape.block, **planes)
-    push = push_of(shape.block, on)
-    if planes.get("water_m") and push is None:
-        issues.remarks.append(DRAINED_NOTE)
-    facts = requested or kind_of_mode(finding.mode, back_fracture=backed)
-    judged_shape = ModeShapes(
-        shape.block, finding.mode, finding.k, finding.beta_deg, finding.phi_deg,
-        finding.phi_back_deg, taken, backed, bool(planes.get("cohesion_pa")),
-        bool(planes.get("jrc")), push, pga_g,
-    )  # fmt: skip
+    facts, judged_shape = _judge(shape, requested, pga_g, issues)
     limit_m = math.nan if displacement_m is None else displacement_m
     across_m = 2.0 * shape.block.r3_m
     if all(remark.code != "check_unit" for remark in shape.remarks):
@@ -421,12 +371,58 @@ def classify_block(
     at_rest_reason = ""
     try:
         numbers_read = numbers_of_shape(facts, judged_shape, limit_m, options, issues)
-    except _FailsAtRest as reason:
-        if not at_rest:
-            raise InputError("; ".join((str(reason), *shape.remarks)), fields=PLANES) from None
-        numbers_read, at_rest_reason = {}, str(reason)
+    except InputError:
+        if issues.state != UNSTABLE or not at_rest:
+            raise
+        numbers_read, at_rest_reason = {}, issues.reason
     remarks = (*off_section, *issues.remarks, *shape.remarks, *unread)
     return Blocks((Group(facts.kind, numbers_read),), remarks, at_rest=at_rest_reason)
+
+
+def _judge(
+    shape: Shape, requested: KindSpec | None, pga_g: float | None, issues: IssueCollector
+) -> tuple[KindSpec, ModeShapes]:
+    """Return the kind that answers for a geometry, and the geometry with its failure mode."""
+    from rbfrag.solver.stability.single import after_first_slip, assess_stability, push_of
+
+    planes = shape.rough()
+    if requested is not None and requested.free_standing:
+        planes["back_fracture"] = False
+    before_slip = {name: planes[name] for name in planes if name != "phi_residual_deg"}
+    finding, on, _ = assess_stability(shape.block, **before_slip)
+    if finding.k > 0.0 and "phi_residual_deg" in planes:
+        planes, after = after_first_slip(shape.block, planes)
+        for remark in after:
+            issues.remark(True, remark)
+        finding, on, _ = assess_stability(shape.block, **planes)
+    push = push_of(shape.block, on)
+    if planes.get("water_m") and push is None:
+        issues.remark(True, DRAINED_NOTE)
+    backed = shape.planes.get("back_fracture", True)
+    return requested or kind_of_mode(finding.mode, back_fracture=backed), ModeShapes(
+        shape.block, finding.mode, finding.k, finding.beta_deg, finding.phi_deg,
+        finding.phi_back_deg, "phi_deg" not in shape.planes, backed,
+        bool(planes.get("cohesion_pa")), bool(planes.get("jrc")), push, pga_g,
+    )  # fmt: skip
+
+
+def classify_draw(
+    shape: Shape, requested: KindSpec | None, limit_m: float, options: Mapping[str, Any]
+) -> tuple[str, str | None, dict[str, Any]]:
+    """Return the state, the kind and the model inputs of a draw of an uncertain geometry.
+
+    A draw of another mode than that of the requested kind has the kind of its own mode.
+    """
+    issues = _ScalarIssues(keeps_remarks=False)
+    try:
+        facts, judged_shape = _judge(shape, requested, None, issues)
+        if facts.mode != judged_shape.mode:
+            facts = kind_of_mode(
+                judged_shape.mode, back_fracture=judged_shape.backed and not facts.free_standing
+            )
+        return "", facts.kind, numbers_of_shape(facts, judged_shape, limit_m, options, issues)
+    except InputError:
+        return issues.state or REJECTED, None, {}
 
 
 def requested_kind(kind: str | None, names: Collection[str]) -> KindSpec | None:

@@ -24,6 +24,7 @@ from rbfrag.question.classify import (
     requested_kind,
 )
 from rbfrag.question.shape_validation import (
+    ANGLE_MISSING,
     BOND,
     DENSITY_NOTE,
     DRAINED_NOTE,
@@ -34,14 +35,17 @@ from rbfrag.question.shape_validation import (
     MOST_M,
     NO_MODEL,
     RECTANGLE,
+    REJECTED,
     SHAPES,
     SMALL_BLOCK,
+    UNSTABLE,
     UNSTABLE_AT_REST,
     ModeShapes,
     check_lengths,
     check_ranges,
     check_size,
     numbers_of_shape,
+    reject_parameters,
     shape_among,
 )
 from rbfrag.results.diagnostic import Diagnostic
@@ -50,22 +54,22 @@ from rbfrag.solver.block.formulas import array_elementwise, cot_gamma, tan_deg
 from rbfrag.solver.kinds import KINDS, KindSpec, facts_of, kind_of_mode
 from rbfrag.solver.stability.arrays import stability_arrays
 from rbfrag.solver.stability.joint import (
+    AFTER_SLIP,
     DRAINAGES,
     DRAINED,
+    ENDED,
     NO_DRAINAGE,
     NO_FRACTURE,
     ROCK_KG_M3,
+    SLIPS_ON,
     UNDRAINED,
     water_at,
 )
 from rbfrag.solver.stability.modes import MODES, words_of_mode
-from rbfrag.solver.stability.residual_strength import AFTER_SLIP, ENDED, SLIPS_ON
 from rbfrag.vocabulary.quantities import JOINT, NUMBERS, PLANES, SPACE
 
-_IF_EMPTY = {"beta_deg": 0.0}
-"""What an empty cell stands for beside the numbers of a block: a level base."""
-
 _FACTS = tuple(KINDS.values())
+_CODES = {kind: code for code, kind in enumerate(KINDS)}
 
 Indices = NDArray[np.intp]
 
@@ -77,6 +81,7 @@ def classify_blocks(
     kinds: str | Sequence[str | None] | None = None,
     modes: Sequence[str | None] | None = None,
     rows: bool = False,
+    draws: bool = False,
     pga_g: NDArray[np.float64] | None = None,
 ) -> Blocks:
     """Classify arrays of blocks: the kind of each and the inputs of its model.
@@ -90,6 +95,7 @@ def classify_blocks(
         modes: failure modes that are stated, empty for none.
         rows: they are rows of a table, which may state more than is needed: numbers go before a
             shape, and what is empty is not stated.
+        draws: a block of another mode than that of its requested kind has the kind of its mode.
         pga_g: PGA at which it is said whether heels or toes give way [g], of the number of blocks
             or of one element; None for no such note.
 
@@ -104,7 +110,7 @@ def classify_blocks(
 
         inputs, wrong, notes = in_sections(inputs, size)
     used_inputs, unread = (inputs, ()) if rows else read_by_some(inputs)
-    sorting = _BlockClassifier(used_inputs, size, rows, pga_g)
+    sorting = _BlockClassifier(used_inputs, size, rows, draws, pga_g)
     for place, why in wrong.items():
         _ArrayIssues(sorting, np.array([place])).reject(True, "{why}", why=why)
     sorting.state_drainage()
@@ -122,26 +128,32 @@ class _ArrayIssues:
     def __init__(self, classifier: _BlockClassifier, indices: Indices) -> None:
         self.classifier, self.indices = classifier, indices
 
-    def reject(self, holds: Any, text: str, *_fields: str, **values: Any) -> None:
+    def reject(
+        self, holds: Any, text: str, /, *_fields: str, state: str = REJECTED, **values: Any
+    ) -> None:
         # the row, or the element, is the subject of its reason
-        self._keep(self.classifier.rejected, holds, text.removeprefix("the block "), values)
+        text = text.removeprefix("the block ")
+        self._keep(self.classifier.rejected, holds, text, values, state)
 
-    def unstable(self, holds: Any, text: str, **values: Any) -> None:
-        self._keep(self.classifier.unstable, holds, text, values)
+    def unstable(self, holds: Any, text: str, /, **values: Any) -> None:
+        self._keep(self.classifier.unstable, holds, text, values, UNSTABLE)
 
-    def remark(self, holds: Any, text: Diagnostic, **values: Any) -> None:
-        rows = np.flatnonzero(np.broadcast_to(holds, self.indices.shape) & self._is_valid())
+    def remark(self, holds: Any, text: Diagnostic, /, **values: Any) -> None:
+        is_valid = self.classifier.is_valid[self.indices]
+        rows = np.flatnonzero(np.broadcast_to(holds, self.indices.shape) & is_valid)
         if not rows.size:
             return
         first = {n: np.broadcast_to(v, self.indices.shape)[rows[0]] for n, v in values.items()}
         example = text.format(**first) if values else str(text)
         self.classifier.remarks.setdefault(text, (example, []))[1].append(self.indices[rows])
 
-    def _is_valid(self) -> NDArray[np.bool_]:
-        return self.classifier.is_valid[self.indices]
-
     def _keep(
-        self, reasons: list[InvalidBlocks], holds: Any, text: str, values: dict[str, Any]
+        self,
+        reasons: list[InvalidBlocks],
+        holds: Any,
+        text: str,
+        values: dict[str, Any],
+        state: str,
     ) -> None:
         rows = np.flatnonzero(holds & self.classifier.is_valid[self.indices])
         if rows.size:
@@ -149,14 +161,16 @@ class _ArrayIssues:
             row_values = {
                 n: _at(v, rows) if isinstance(v, np.ndarray) else v for n, v in values.items()
             }
-            reasons.append(InvalidBlocks(self.indices[rows], text, row_values))
+            reasons.append(InvalidBlocks(self.indices[rows], text, row_values, state))
 
 
 class _BlockClassifier:
     """Classification of arrays of blocks by kind."""
 
-    def __init__(self, inputs: Mapping[str, Any], size: int, rows: bool, pga_g: Any) -> None:
-        self.size, self.rows, self.pga_g = size, rows, pga_g
+    def __init__(
+        self, inputs: Mapping[str, Any], size: int, rows: bool, draws: bool, pga_g: Any
+    ) -> None:
+        self.size, self.rows, self.draws, self.pga_g = size, rows, draws, pga_g
         backed = np.asarray(inputs.get("back_fracture", 1.0), dtype=np.float64)
         self.backed = np.broadcast_to(backed != 0.0, (size,))
         """Behind which blocks a plane is; where that is not given, one is."""
@@ -184,8 +198,15 @@ class _BlockClassifier:
     ) -> Blocks:
         self._state(kinds, modes)
         shapes = self._shapes()
-        self._state_free(shapes)
-        remaining = ~self._complete()
+        restitution = self.inputs.get("restitution")
+        if restitution is not None and (shapes or {"p2", "kr"} & self.inputs.keys()):
+            facts = requested_kind(None, ("restitution",))
+            assert facts is not None
+            has_restitution = ~np.isnan(restitution) if self.rows else True
+            self.kinds[(self.kinds < 0) & has_restitution] = _CODES[facts.kind]
+        remaining = np.ones(self.size, dtype=np.bool_)
+        for facts in kinds_by_numbers(self.inputs):
+            remaining &= ~self._has_all(facts.parameters)
         for shape in shapes:
             selected = remaining & self._has_all(shape)
             remaining &= ~selected
@@ -193,18 +214,23 @@ class _BlockClassifier:
                 self._sort_shapes(shape, np.flatnonzero(selected))
             self.is_classified |= selected
         if shapes:  # of which part of a shape is empty, and no number is stated either
-            selected = remaining & ~self._has_any(NUMBERS)
+            selected = remaining
+            for name in self.inputs.keys() & {*NUMBERS}:
+                selected = selected & np.isnan(self.inputs[name])
             if selected.any():
                 self._sort_shapes(shapes[0], np.flatnonzero(selected))
             self.is_classified |= selected
         if not self.is_classified.all():
             self._sort_numbers(np.flatnonzero(~self.is_classified))
+        remarks = []
+        for warning, (text, parts) in self.remarks.items():
+            rows = np.concatenate(parts)
+            if text != warning and rows.size > 1:
+                text += f" (and {rows.size - 1:,} more rows)"
+            remarks.append(warning.replaced(text=text, rows=rows))
         return Blocks(
-            tuple(self.groups),
-            tuple(_about_rows(warning, *rows) for warning, rows in self.remarks.items()),
-            tuple(self.rejected),
-            tuple(self.unstable), self.kinds, self.modes,
-            frozenset(self.read),
+            tuple(self.groups), tuple(remarks), tuple(self.rejected), tuple(self.unstable),
+            self.kinds, self.modes, frozenset(self.read),
         )  # fmt: skip
 
     def state_drainage(self) -> None:
@@ -222,7 +248,7 @@ class _BlockClassifier:
     ) -> None:
         """Set the requested kinds, from the kind or the failure mode of each block."""
         if isinstance(kinds, str):
-            self.kinds[:] = _codes()[facts_of(kinds).kind]
+            self.kinds[:] = _CODES[facts_of(kinds).kind]
             kinds = None
         if kinds is None and modes is None:
             return
@@ -242,9 +268,9 @@ class _BlockClassifier:
                 _ArrayIssues(self, indices).reject(True, "{why}", why=text)
                 continue
             if kind:
-                code = _codes()[kind]
+                code = _CODES[kind]
             elif code < 0 and mode in MODES:
-                code = _codes()[kind_of_mode(mode, back_fracture=backed).kind]
+                code = _CODES[kind_of_mode(mode, back_fracture=backed).kind]
             self.kinds[indices] = code
             if mode in MODES:
                 self.modes[indices] = MODES.index(mode)
@@ -255,16 +281,6 @@ class _BlockClassifier:
                     f"the block's mode is {words_of_mode(mode[:40])}: {model} model does not apply"
                 )
                 _ArrayIssues(self, indices).reject(True, "{why}", why=text)
-
-    def _state_free(self, shapes: Sequence[tuple[str, ...]]) -> None:
-        """Classify blocks with a coefficient of restitution as free-standing."""
-        restitution = self.inputs.get("restitution")
-        if restitution is None or not (shapes or {"p2", "kr"} & self.inputs.keys()):
-            return
-        facts = requested_kind(None, ("restitution",))
-        assert facts is not None
-        has_restitution = ~np.isnan(restitution) if self.rows else True
-        self.kinds[(self.kinds < 0) & has_restitution] = _codes()[facts.kind]
 
     def _shapes(self) -> list[tuple[str, ...]]:
         """Return the geometry that is given; for a table, all geometries its rows may have."""
@@ -278,34 +294,10 @@ class _BlockClassifier:
             return complete_shapes
         without_back = () if self.backed.all() else ("back_fracture",)
         shape = shape_among({*self.inputs, *without_back})
-        if shape is not None and (numbers := [name for name in NUMBERS if name in self.inputs]):
-            raise InputError(
-                f"{numbers[0]} cannot be combined with {shape[0]}: give one description of the "
-                "block",
-                fields=(numbers[0], *shape),
-            )
-        return [] if shape is None else [shape]
-
-    def _complete(self) -> Any:
-        """Return which blocks have all parameters of a kind."""
-        complete = np.zeros(self.size, dtype=np.bool_)
-        for facts in kinds_by_numbers(self.inputs):
-            complete |= self._has_all(facts.parameters)
-        return complete
-
-    def _with_default(self, name: str) -> Any:
-        """Return the values of a field, with the default in empty cells of a table."""
-        values = self.inputs[name]
-        if self.rows and name in _IF_EMPTY:
-            return np.where(np.isnan(values), _IF_EMPTY[name], values)
-        return values
-
-    def _has_any(self, names: Collection[str]) -> Any:
-        has_any = np.zeros(self.size, dtype=np.bool_)
-        for name in names:
-            if name in self.inputs:
-                has_any |= ~np.isnan(self.inputs[name])
-        return has_any
+        if shape is None:
+            return []
+        reject_parameters(self.inputs, shape)
+        return [shape]
 
     def _has_all(self, names: Collection[str]) -> Any:
         has_all = np.ones(self.size, dtype=np.bool_)
@@ -321,8 +313,8 @@ class _BlockClassifier:
             for facts in kinds_by_numbers(names):
                 kind = block_of([name for name in names if name in _numbers_of(facts)]).kind
                 selected = (self.kinds < 0) & self._has_all(facts.parameters)
-                self.kinds[selected] = _codes()[kind]
-            self.kinds[self.kinds < 0] = _codes()[block_of(names).kind]
+                self.kinds[selected] = _CODES[kind]
+            self.kinds[self.kinds < 0] = _CODES[block_of(names).kind]
         of_these = self.kinds[indices]
         for code in np.unique(of_these[self.is_valid[indices]]).tolist():
             facts = _FACTS[code]
@@ -340,9 +332,10 @@ class _BlockClassifier:
                     f"missing: a block of kind {facts.kind} is given by {parameters}",
                 )
                 continue
-            numbers = {
-                name: self._with_default(name) for name in _numbers_of(facts) if name in self.inputs
-            }
+            numbers = {n: self.inputs[n] for n in _numbers_of(facts) if n in self.inputs}
+            if self.rows and "beta_deg" in numbers:  # an empty cell stands for a level base
+                dip_deg = numbers["beta_deg"]
+                numbers["beta_deg"] = np.where(np.isnan(dip_deg), 0.0, dip_deg)
             self.read |= numbers.keys()
             if "p2" in numbers:
                 check_size(_at(numbers["p2"], selected), _ArrayIssues(self, selected))
@@ -359,7 +352,7 @@ class _BlockClassifier:
         if shape != RECTANGLE:
             for name in ("beta_deg", "phi_deg"):
                 if name not in columns:
-                    raise InputError(f"{name}{FRICTION_MISSING[7:]}", fields=(name,))
+                    raise InputError(f"{name}{ANGLE_MISSING}", fields=(name,))
         issues = _ArrayIssues(self, indices)
         # an empty cell gives nothing, nor does what has a default
         unsaid = (*JOINT, *BOND) if self.rows else ("joint_length_m", "phi_residual_deg")
@@ -426,7 +419,7 @@ class _BlockClassifier:
         has_residual = np.broadcast_to(~np.isnan(residual), (n,))
         if has_residual.any():
             first = judged_all
-            first_slip = {"k": first.yield_acceleration, "mode": first.mode}
+            first_slip: dict[str, Any] = {"k": first.yield_acceleration, "mode": first.mode}
             issues.unstable(
                 has_residual & (first.yield_acceleration <= 0.0), UNSTABLE_AT_REST, **first_slip
             )
@@ -467,7 +460,7 @@ class _BlockClassifier:
             mode, of_these = MODES[code], indices[rows]
             facts = (
                 kind_of_mode(mode, back_fracture=not free_standing)
-                if requested < 0
+                if requested < 0 or (self.draws and _FACTS[requested].mode != mode)
                 else _FACTS[requested]
             )
             self.kinds[of_these] = _FACTS.index(facts)
@@ -517,21 +510,9 @@ def push_of_blocks(blocks: BlockArray, beta_deg: Any, water_m: Any, density_kg_m
     return along, normal, moment * h
 
 
-def _about_rows(warning: Diagnostic, example: str, parts: Sequence[Indices]) -> Diagnostic:
-    """Return a warning about rows, with the values of the first row."""
-    rows = np.concatenate(parts)
-    more = f" (and {rows.size - 1:,} more rows)" if example != warning and rows.size > 1 else ""
-    return warning.replaced(text=example + more, rows=rows)
-
-
 def _at(values: Any, indices: Indices) -> Any:
     """Return the values at these indices; a single value holds for all."""
     return values if values.size == 1 else values[indices]
-
-
-@cache
-def _codes() -> dict[str, int]:
-    return {kind: code for code, kind in enumerate(KINDS)}
 
 
 @cache

@@ -147,7 +147,12 @@ def to_single_component(inputs: Mapping[str, Any], component: Any) -> dict[str, 
     Raises:
         InputError: an unknown name.
     """
-    ratio, sigma = _conversion(component)
+    ratio: Callable[[str], Any]
+    if isinstance(component, str):
+        definition = component_named(component)
+        ratio, sigma = definition.ratio, definition.sigma
+    else:
+        ratio, sigma = _conversion_of_rows(component)
     result = dict(inputs)
     for name in AMPLIFIED.keys() & inputs.keys():
         value = inputs[name]
@@ -184,14 +189,11 @@ def _array(value: Any) -> Any:
     return np.asarray(value, dtype=np.float64)
 
 
-def _conversion(component: Any) -> tuple[Callable[[str], Any], Any]:
-    """Return the ratio of a measure as a function of its name, and the dispersion."""
-    if isinstance(component, str):
-        definition = component_named(component)
-        return definition.ratio, definition.sigma
+def _conversion_of_rows(components: Any) -> tuple[Callable[[str], Any], Any]:
+    """Return the ratios of a measure as a function of its name, and the dispersions."""
     import numpy as np
 
-    names = np.array(component, dtype=object)
+    names = np.array(components, dtype=object)
     texts = [
         SINGLE_COMPONENT if name is None or name == "" or name != name else str(name)
         for name in names.ravel().tolist()

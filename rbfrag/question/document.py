@@ -10,13 +10,10 @@ from rbfrag.errors import InputError
 from rbfrag.fragility.measures import AMPLIFIED
 from rbfrag.fragility.model_selection import find_model, suited_models, unused_measures
 from rbfrag.fragility.prediction import Prediction, add_warnings, answer_given, with_values
+from rbfrag.question.classify import has_shape
 from rbfrag.question.components import SINGLE_ASSUMED, to_single_component
-from rbfrag.question.question import (
-    OF_SHAKING,
-    ask_at_rest,
-    described,
-    with_drained_bound,
-)
+from rbfrag.question.drained_bound import with_drained_bound
+from rbfrag.question.nominal import MEASURED, OF_SHAKING, ask_at_rest, described
 from rbfrag.results.diagnostic import Diagnostic, diagnostics
 from rbfrag.vocabulary.quantities import INTENSITY, SCENARIO
 
@@ -26,12 +23,6 @@ if TYPE_CHECKING:
     from rbfrag.fragility.model import FragilityModel
     from rbfrag.fragility.prediction_motion import Polarity
     from rbfrag.motions.readers import MotionLike
-
-
-BESIDE_A_MOTION = (
-    "the motion is the shaking at the site: omit rjb_km, vs30_m_s, amplification, mechanism, gmm "
-    "and component"
-)
 
 
 def answer_block(inputs: Mapping[str, Any], *, kind: str | None = None, **how: Any) -> Prediction:
@@ -46,11 +37,28 @@ def answer_block(inputs: Mapping[str, Any], *, kind: str | None = None, **how: A
         InputError: as of :func:`answer_numbers`, and a block that is described in part.
     """
     warnings = how.pop("remarks", ())
+    target, solve_for = how.pop("target_probability", None), how.pop("solve_for", None)
 
-    def answer(question: Mapping[str, Any]) -> Prediction:
+    def answer_stated(question: Mapping[str, Any]) -> Prediction:
         return _answer_described(question, kind=kind, **how)
 
-    result = with_drained_bound(answer, inputs, kind)
+    def answer(question: Mapping[str, Any], **more: float) -> Prediction:
+        is_scenario = how.get("gmm") is not None or "rjb_km" in question
+        if MEASURED.isdisjoint(question) and not is_scenario and not has_shape(question):
+            return answer_stated(question)
+        from rbfrag.question.measurement import answering, answering_motion, with_measurement_errors
+
+        motion = how.get("motion")
+        draws = answering if motion is None else answering_motion(motion, how.get("polarity"))
+        about = {**how, "sensitivity": True}
+        return with_measurement_errors(answer_stated, question, kind, about, draws, **more)
+
+    if target is not None or solve_for is not None:
+        from rbfrag.question.inverse import solve
+
+        result = solve(answer, inputs, kind, target, solve_for)
+    else:
+        result = with_drained_bound(answer, inputs, kind)
     return with_values(result, warnings=diagnostics(warnings, result.warnings))
 
 
@@ -68,7 +76,8 @@ def _answer_described(inputs: Mapping[str, Any], *, kind: str | None, **how: Any
     names = ("kind", "model", "level", "db", "mechanism", "gmm", "rotation_deg", "sites")
     options = {name: how[name] for name in names if how.get(name) is not None}
     answer = add_warnings(ask_at_rest(shaking, blocks, **options), blocks.remarks)
-    return _with_alternatives(answer, [answer], measures, how.get("sites"))
+    sites = None if how.get("sites") is None else int(how["sites"])
+    return with_values(answer, alternatives=(answer,), inputs=measures, sites=sites)
 
 
 def answer_numbers(
@@ -116,8 +125,11 @@ def answer_numbers(
     source, inputs = (mechanism, gmm, component), question
     if source != (None, None, None) or not SCENARIO.isdisjoint(question):
         if motion is not None:
-            fields = (*SCENARIO, "mechanism", "gmm", "component")
-            raise InputError(BESIDE_A_MOTION, fields=fields)
+            raise InputError(
+                "the motion is the shaking at the site: omit rjb_km, vs30_m_s, amplification, "
+                "mechanism, gmm and component",
+                fields=(*SCENARIO, "mechanism", "gmm", "component"),
+            )
         from rbfrag.question.scenario import SITE, Source, describe_source, shaken
 
         if source[:2] != (None, None) or not question.keys().isdisjoint(SITE):
@@ -157,19 +169,10 @@ def answer_numbers(
         unused = unused_measures(models[0], question)
         if is_component_assumed and 0.0 < answers[0].probability < 1.0:
             notes = (_as_rotd50(models[0], question, weights, answers[0].probability),)
-    warnings = diagnostics(remarks, unused, answers[0].warnings, notes)
-    return _with_alternatives(with_values(answers[0], warnings=warnings), answers, inputs, sites)
-
-
-def _with_alternatives(
-    answer: Prediction,
-    alternatives: Sequence[Prediction],
-    inputs: Mapping[str, Any],
-    sites: float | None,
-) -> Prediction:
     return with_values(
-        answer,
-        alternatives=tuple(alternatives),
+        answers[0],
+        warnings=diagnostics(remarks, unused, answers[0].warnings, notes),
+        alternatives=tuple(answers),
         inputs=inputs,
         sites=None if sites is None else int(sites),
     )

@@ -19,9 +19,10 @@ V = TypeVar("V")
 """A number, or an array of numbers."""
 
 
-class NumberFields(TypedDict, Generic[V], total=False):
-    """Parameters of a block by kind of failure, which replace its geometry."""
+class BlockFields(TypedDict, Generic[V], total=False):
+    """Inputs of a block: parameters, or geometry and planes."""
 
+    # parameters by kind of failure, which replace the geometry
     p2: V
     kr: V
     ky: V
@@ -30,17 +31,11 @@ class NumberFields(TypedDict, Generic[V], total=False):
     kct: V
     pct2: V
 
-
-class FailureFields(TypedDict, Generic[V], total=False):
-    """Model inputs of a block in addition to its parameters or its geometry."""
-
+    # model inputs in addition to parameters or geometry
     displacement_m: V
     restitution: V
 
-
-class ShapeFields(TypedDict, Generic[V], total=False):
-    """Dimensions and angles of a block."""
-
+    # dimensions and angles
     height_m: V
     width_m: V
     alpha1_deg: V
@@ -50,38 +45,19 @@ class ShapeFields(TypedDict, Generic[V], total=False):
     s2_m: V
     gamma_deg: V
 
-
-class PlaneFields(TypedDict, Generic[V], total=False):
-    """Dips and friction angles of the planes under and behind a block."""
-
+    # dips and friction angles of the planes
     beta_deg: V
     phi_deg: V
     phi_back_deg: V
 
-
-class SpaceFields(TypedDict, total=False):
-    """Planes of a block in space, as dip/dip direction."""
-
-    base: str | None
-    back: str | None
-    face: str | None
-
-
-class JointFields(TypedDict, Generic[V], total=False):
-    """Joint properties of a block, and its residual friction after the first slip."""
-
+    # joint properties, and the residual friction after the first slip
     water_m: V
     jrc: V
     jcs_mpa: V
     joint_length_m: V
     phi_residual_deg: V
 
-
-class ScatterFields(TypedDict, Generic[V], total=False):
-    """Block uncertainty: standard deviations; the value is the median, and P the mean over the
-    distribution.
-    """
-
+    # block uncertainty: the values are medians, and P is the mean over the distribution
     p2_sigma: V
     kr_sigma: V
     ky_sigma: V
@@ -90,18 +66,6 @@ class ScatterFields(TypedDict, Generic[V], total=False):
     kct_sigma: V
     pct2_sigma: V
     restitution_sigma: V
-
-
-class BlockFields(
-    NumberFields[V],
-    FailureFields[V],
-    ShapeFields[V],
-    PlaneFields[V],
-    JointFields[V],
-    ScatterFields[V],
-    total=False,
-):
-    """Inputs of a block: parameters, or geometry and planes."""
 
 
 class MeasureFields(TypedDict, Generic[V], total=False):
@@ -118,8 +82,8 @@ class MeasureFields(TypedDict, Generic[V], total=False):
     magnitude: V
 
 
-class SceneFields(TypedDict, Generic[V], total=False):
-    """Uncertainty of intensity measures, scenario and site."""
+class ShakingFields(MeasureFields[V], total=False):
+    """Intensity measures, their uncertainty, scenario and site."""
 
     pgv_sigma: V
     pga_sigma: V
@@ -133,10 +97,6 @@ class SceneFields(TypedDict, Generic[V], total=False):
     amplification_sigma: V
 
 
-class ShakingFields(MeasureFields[V], SceneFields[V], total=False):
-    """Inputs of the shaking."""
-
-
 class SourceFields(TypedDict, total=False):
     """Mechanism and ground-motion model of a scenario earthquake."""
 
@@ -144,14 +104,13 @@ class SourceFields(TypedDict, total=False):
     gmm: str | PathLike[str] | None
 
 
-class ComponentFields(TypedDict, total=False):
-    """Definition of the horizontal component of the intensity measures."""
-
-    component: str | Sequence[str | None] | None
-
-
-class WholeFields(SpaceFields, total=False):
+class WholeFields(TypedDict, total=False):
     """Inputs that hold for all blocks."""
+
+    # planes in space, as dip/dip direction
+    base: str | None
+    back: str | None
+    face: str | None
 
     block: Block | None
     back_fracture: bool | None
@@ -159,12 +118,6 @@ class WholeFields(SpaceFields, total=False):
     cohesion_pa: float | None
     density_kg_m3: float | None
     kind: str | None
-
-
-class AtRestFields(TypedDict, total=False):
-    """Static inputs of a block without an earthquake."""
-
-    kv: float | None
 
 
 class AnsweringFields(TypedDict, total=False):
@@ -181,58 +134,46 @@ class RangeFields(AnsweringFields, total=False):
     sites: float | None
 
 
-class RequestFields(RangeFields, SourceFields, ComponentFields, total=False):
-    """Options of a prediction."""
+class QuestionFields(
+    BlockFields[V], WholeFields, ShakingFields[V], RangeFields, SourceFields, total=False
+):
+    """Keywords of :func:`rbfrag.predict`."""
 
-    rotation_deg: float | None
+    # standard deviations of measured fields; lengths also in per cent, as a text ("5%")
+    height_sigma_m: V | str
+    width_sigma_m: V | str
+    alpha1_sigma_deg: V
+    alpha3_sigma_deg: V
+    r3_sigma_m: V | str
+    s1_sigma_m: V | str
+    s2_sigma_m: V | str
+    gamma_sigma_deg: V
+    beta_sigma_deg: V
+    phi_sigma_deg: V
+    phi_back_sigma_deg: V
+    base_sigma_deg: V
+    back_sigma_deg: V
+    water_sigma_m: V | str
+    cohesion_sigma_pa: V | str
+    density_sigma_kg_m3: V | str
+    gmm_sigma: V
 
-
-class RecordFields(TypedDict, Generic[V], total=False):
-    """Spectral accelerations and ground motions."""
-
+    # spectral accelerations and ground motions
     sa_g: Mapping[float, V] | None
     motion: MotionLike | None
     polarity: Polarity
 
+    # the request
+    component: str | Sequence[str | None] | None
+    rotation_deg: float | None
+    target_probability: float | None
+    solve_for: str | None
 
-class ArrayFields(TypedDict, total=False):
-    """Options of arrays."""
-
+    # options of arrays
     nan: Literal["propagate", "raise"]
     interval: bool
+    sensitivity: bool
     weights: ArrayLike | None
-
-
-class QuestionFields(
-    BlockFields[V],
-    WholeFields,
-    ShakingFields[V],
-    RecordFields[V],
-    RequestFields,
-    ArrayFields,
-    total=False,
-):
-    """Keywords of :func:`rbfrag.predict`."""
-
-
-class RowFields(TypedDict, total=False):
-    """Columns of a table in addition to block and shaking."""
-
-    block_id: str
-    site_id: str
-    kind: str
-    mode: str
-    lon: float
-    lat: float
-    x: float
-    y: float
-    z: float
-    crs: str
-    strike_length_m: float
-    count: float
-    weight: float
-    loss: float
-    loss_sigma: float
 
 
 class BlockKeywords(BlockFields[V], WholeFields, total=False):

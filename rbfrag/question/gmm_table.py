@@ -12,12 +12,9 @@ from numpy.typing import NDArray
 
 from rbfrag.errors import InputError
 from rbfrag.files import csv_rows, source_text
-from rbfrag.fragility.measures import SCATTERED
+from rbfrag.fragility.measures import SCATTERED, SIGMAS
 from rbfrag.question.bssa14 import Ordinate
 from rbfrag.question.table import columns_in
-
-SIGMAS = {measure: sigma for sigma, measure in SCATTERED.items()}
-"""Measures, and the name of the standard deviation of each."""
 
 _CONTENT = "a table of medians and sigmas"
 _NEAREST_KM = 0.1

@@ -10,15 +10,15 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rbfrag.errors import InputError, ModelError
-from rbfrag.fragility.invalid_rows import block_reasons
 from rbfrag.fragility.measures import MEASURES
 from rbfrag.fragility.model import AT_REST, FragilityModel
 from rbfrag.fragility.model_selection import block_of, unused_measures
 from rbfrag.fragility.prediction import Prediction, add_warnings, answer_given
 from rbfrag.fragility.prediction_array import PredictionArray, ReasonPart, Reasons, flat, index_of
+from rbfrag.fragility.validation import block_reasons
 from rbfrag.question.classify import Blocks, InvalidBlocks, classify_block
 from rbfrag.question.classify_arrays import classify_blocks
-from rbfrag.question.shape_validation import PLANE_TEXTS
+from rbfrag.question.shape_validation import PLANE_TEXTS, STATES
 from rbfrag.results.diagnostic import Diagnostic, diagnostics
 from rbfrag.solver.kinds import BY_MECHANICS
 
@@ -34,6 +34,7 @@ def ask_many(
     mode: Sequence[str | None] | None,
     *,
     rows: bool,
+    draws: bool,
     level: float,
     nan: Literal["propagate", "raise"],
     interval: bool,
@@ -48,6 +49,7 @@ def ask_many(
         kind: how they fail, for all or one each.
         mode: failure modes that are stated, one each.
         rows: the arrays are columns of a table.
+        draws: each block is answered by its own mode, whatever kind is asked for.
         level: confidence level.
         nan: what becomes of elements that cannot be used.
         interval: whether an interval is asked for.
@@ -58,24 +60,15 @@ def ask_many(
     Raises:
         InputError: nothing of it can be answered for, or, if asked, an element.
     """
-    numbers = dict(inputs)
-    labels = {"kind": kind, "mode": mode}
-    texts = {
-        n: np.zeros(len(v)) for n, v in labels.items() if v is not None and not isinstance(v, str)
-    }
-    planes = {
-        name: np.array(numbers.pop(name), dtype=object) for name in PLANE_TEXTS if name in numbers
-    }
-    texts |= {name: np.zeros(text.shape) for name, text in planes.items()}
-    values, shape = flat({**numbers, **texts})
+    values, planes, shape = _flatten(inputs, kind=kind, mode=mode)
     size = int(np.prod(shape))
-    written = {name: np.broadcast_to(text, shape).ravel() for name, text in planes.items()}
     measures = {name: value for name, value in values.items() if name in MEASURES}
-    block: dict[str, Any] = {n: v for n, v in values.items() if n not in {*measures, *texts}}
+    block = {name: value for name, value in values.items() if name not in MEASURES}
     blocks = classify_blocks(
-        {**block, **written}, size, kinds=kind, modes=mode, rows=rows, pga_g=measures.get("pga_g")
-    )
-    if not rows:
+        {**block, **planes}, size, kinds=kind, modes=mode, rows=rows, draws=draws,
+        pga_g=None if draws else measures.get("pga_g"),
+    )  # fmt: skip
+    if not rows and not draws:
         _reject_unread(blocks, block)
     if weights is not None:
         return _of_draws(blocks, inputs, level, weights, sites, size, find)
@@ -101,7 +94,29 @@ def ask_many(
         parts.append((indices, add_warnings(answer, unused_measures(chosen, group_inputs))))
     if nan == "raise":
         _reject(rejected, parts, blocks, shape)
-    return _together(parts, rejected, blocks, shape, level, index_of(numbers))
+    index = index_of({name: value for name, value in inputs.items() if name not in planes})
+    return _together(parts, rejected, blocks, shape, level, index)
+
+
+def _flatten(
+    inputs: Mapping[str, Any], **labels: str | Sequence[str | None] | None
+) -> tuple[dict[str, Any], dict[str, NDArray[Any]], tuple[int, ...]]:
+    """Return the numbers and the texts of blocks as flat arrays, and their common shape.
+
+    Args:
+        inputs: fields: numbers, texts, or arrays of either.
+        labels: kinds and modes, sequences of which have the length of the arrays.
+
+    Raises:
+        InputError: shapes that are not compatible, or a field that is not a number.
+    """
+    planes = {name: np.array(inputs[name], dtype=object) for name in PLANE_TEXTS if name in inputs}
+    numbers = {name: value for name, value in inputs.items() if name not in planes}
+    sizes = {n: len(v) for n, v in labels.items() if v is not None and not isinstance(v, str)}
+    shapes = sizes | {name: text.shape for name, text in planes.items()}
+    values, shape = flat({**numbers, **{name: np.zeros(shapes[name]) for name in shapes}})
+    texts = {name: np.broadcast_to(text, shape).ravel() for name, text in planes.items()}
+    return {name: values[name] for name in numbers}, texts, shape
 
 
 def blocks_of_arrays(inputs: Mapping[str, Any]) -> tuple[Blocks, int]:
@@ -118,20 +133,12 @@ def blocks_of_arrays(inputs: Mapping[str, Any]) -> tuple[Blocks, int]:
     kind = block_fields.pop("kind", None)
     if "block" in block_fields:
         return classify_block(block_fields, kind), 1
-    kinds = {} if kind is None or isinstance(kind, str) else {"kind": np.zeros(len(kind))}
-    planes = {
-        name: np.array(block_fields.pop(name), dtype=object)
-        for name in PLANE_TEXTS
-        if name in block_fields
-    }
-    each_text = {name: np.zeros(text.shape) for name, text in planes.items()}
-    values, shape = flat({**block_fields, **kinds, **each_text})
+    numbers, planes, shape = _flatten(block_fields, kind=kind)
     size = int(np.prod(shape))
-    numbers: dict[str, Any] = {name: values[name] for name in block_fields}
-    numbers |= {name: np.broadcast_to(text, shape).ravel() for name, text in planes.items()}
-    blocks = classify_blocks(numbers, size, kinds=kind)
-    if not kinds:  # of a table that states the kinds, others may read what these do not
-        _reject_unread(blocks, block_fields)
+    blocks = classify_blocks({**numbers, **planes}, size, kinds=kind)
+    if kind is None or isinstance(kind, str):
+        # of a table that states the kinds, others may read what these do not
+        _reject_unread(blocks, numbers)
     return blocks, size
 
 
@@ -252,7 +259,10 @@ def _together(
         return warning.replaced(rows=at) if at.size < size else warning
 
     warnings = (in_order(w, at) for at, part in parts for w in diagnostics(part.warnings))
-    codes = {"kind_codes": blocks.kinds, "mode_codes": blocks.modes}
+    states = np.zeros(size, dtype=np.int8)
+    for entry in (*rejected, *blocks.unstable):
+        states[entry.indices] = 1 + STATES.index(entry.state)
+    codes = {"kind_codes": blocks.kinds, "mode_codes": blocks.modes, "state_codes": states}
     grid: dict[str, Any] = {
         n: entry.reshape(shape) for n, entry in codes.items() if entry is not None
     }

@@ -15,23 +15,22 @@ from typing import Any, NamedTuple
 
 from rbfrag.errors import InputError
 from rbfrag.fragility import describe
-from rbfrag.fragility.measures import AMPLIFIED, SCATTERED, TERMS
+from rbfrag.fragility.measures import AMPLIFIED, SCATTERED, SIGMAS, TERMS
 from rbfrag.fragility.method import SINGLE, ArrayNamespace, arrays
 from rbfrag.fragility.model import FragilityModel, Model
 from rbfrag.fragility.model_selection import stored_row
 from rbfrag.fragility.prediction import is_single, single
-from rbfrag.question.bssa14 import MEASURES, MECHANISMS, Ordinate, bssa14
+from rbfrag.question.bssa14 import MEASURES, Ordinate, bssa14
 from rbfrag.question.components import COMPONENT_SIGMA, to_single_component, total_sigma
 from rbfrag.results.diagnostic import Diagnostic
 from rbfrag.results.result import Result, TextLine, TextTable
-from rbfrag.vocabulary.quantities import INTENSITY, QUANTITIES
+from rbfrag.vocabulary.quantities import INTENSITY, MECHANISMS, QUANTITIES
 
 SITE = ("rjb_km", "vs30_m_s")
 """Fields that make a question one of a scenario."""
 
 GROUND = ("magnitude", *SITE)
 
-_SIGMAS = {measure: sigma for sigma, measure in SCATTERED.items()}
 # that 400 km is the limit of the paper is from memory
 _RANGES = {"magnitude": (3.0, 8.5), "rjb_km": (0.0, 400.0), "vs30_m_s": (150.0, 1500.0)}
 _MOST_OF_NORMAL = 7.0
@@ -85,7 +84,7 @@ def shaken(
         component: horizontal component of the measures, by name; None for single.
 
     Raises:
-        InputError: a scenario that is stated in part or beside measures, or out of range, or
+        InputError: a scenario that is given in part or together with measures, or out of range, or
             with a component, which is RotD50.
     """
     question, remarks = dict(inputs), tuple[Diagnostic, ...]()
@@ -104,7 +103,7 @@ def shaken(
             question["magnitude"] = inputs["magnitude"]
         ns = _numbers(inputs)
         for name, im in measures.items():
-            question[name], question[_SIGMAS[name]] = im.median, im.sigma(ns)
+            question[name], question[SIGMAS[name]] = im.median, im.sigma(ns)
         if "pgv_m_s" in measures:
             question["pgv_tau"] = measures["pgv_m_s"].tau
         sigma = inputs.get("amplification_sigma", 0.0)
@@ -136,7 +135,7 @@ def scenario(
     Raises:
         InputError: something is missing, given twice, or outside the range of the model.
     """
-    clashing = [n for n in inputs if (n in INTENSITY or n in _SIGMAS.values()) and n != "magnitude"]
+    clashing = [n for n in inputs if (n in INTENSITY or n in SCATTERED) and n != "magnitude"]
     if clashing:
         raise InputError(
             f"{clashing[0]} cannot be combined with a scenario (magnitude and rjb_km): omit one of "
@@ -241,7 +240,7 @@ def scenario_shaking(inputs: Mapping[str, Any], source: Source) -> ScenarioShaki
     if source.gmm is not None:
         from rbfrag.question.gmm_table import read_gmm_table
 
-        names = tuple(name for name in _SIGMAS if name in read_gmm_table(source.gmm))
+        names = tuple(name for name in SIGMAS if name in read_gmm_table(source.gmm))
     result = {}
     for name, im in scenario(site, source, names).items():
         median = im.median * inputs.get("amplification", 1.0)

@@ -16,18 +16,37 @@ from rbfrag.results.diagnostic import Diagnostic
 from rbfrag.solver.block.formulas import SCALAR, Elementwise, array_elementwise, tan_deg
 from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.kinds import NOT_BACKED, KindSpec, stands_free_of
-from rbfrag.solver.stability.at_rest import rocking_at_rest, two_contacts_at_rest
 from rbfrag.solver.stability.joint import (
     ASSUMED_DENSITY,
     IS_DRAINED,
     NO_EFFECT_OF_COHESION,
+    ROUGH,
+    STATE_RESIDUAL,
     STAYS_UNDRAINED,
+    slips_on_base,
 )
-from rbfrag.solver.stability.margins import idealisations
-from rbfrag.solver.stability.modes import ModeName, words_of_mode
-from rbfrag.solver.stability.residual_strength import ROUGH, STATE_RESIDUAL, slips_on_base
-from rbfrag.solver.stability.toe_stability import HEEL_TIPS, TOE_SLIPS, heel_tips_g, toe_slips_g
-from rbfrag.vocabulary.quantities import JOINT, PLANES, QUANTITIES, SPACE, column_of, word_of
+from rbfrag.solver.stability.modes import (
+    ModeName,
+    rocking_at_rest,
+    two_contacts_at_rest,
+    words_of_mode,
+)
+from rbfrag.solver.stability.validity import (
+    HEEL_TIPS,
+    TOE_SLIPS,
+    heel_tips_g,
+    idealisations,
+    toe_slips_g,
+)
+from rbfrag.vocabulary.quantities import (
+    JOINT,
+    NUMBERS,
+    PLANES,
+    QUANTITIES,
+    SPACE,
+    column_of,
+    word_of,
+)
 
 if TYPE_CHECKING:
     from rbfrag.solver.block.arrays import BlockArray
@@ -43,7 +62,6 @@ SHAPES = {
 
 WAYS = ", or by ".join(" ".join(names) for names in SHAPES)
 
-
 LEAST_DEG, LEAST_DIP_DEG = 1.6, 0.8
 """Friction angles and dips below this are questioned [deg]: radians may have been meant."""
 
@@ -51,21 +69,25 @@ LEAST_M, MOST_M, LEAST_P2 = 0.05, 30.0, 0.1
 """Blocks smaller or larger than this, or of a smaller p², are questioned: another unit may have
 been meant."""
 
+SMALL_P2 = Diagnostic(
+    "Check the unit: p² = {value:.3g} s⁻² is a block of {size:.0f} m", "check_unit"
+)
+SMALL_BLOCK = Diagnostic("Check the unit: the block measures {value:.2g} m", "check_unit")
+
 LENGTHS = ("height_m", "width_m", "s1_m", "s2_m", "r3_m")
 
 DENSITY_NOTE = Diagnostic(ASSUMED_DENSITY, "density_assumed")
-
-UNDRAINED_NOTE = Diagnostic(STAYS_UNDRAINED, "undrained")
-
 DRAINED_NOTE = Diagnostic(IS_DRAINED, "drained")
-
-COHESION_NOTE = Diagnostic(NO_EFFECT_OF_COHESION, "cohesion_without_effect")
+_UNDRAINED_NOTE = Diagnostic(STAYS_UNDRAINED, "undrained")
+_COHESION_NOTE = Diagnostic(NO_EFFECT_OF_COHESION, "cohesion_without_effect")
+_STANDS_FREE = Diagnostic(NOT_BACKED, "not_backed")
 
 DRAINS_NOTHING = (
     "drainage requires water_m, the height of the water in the back fracture: give both or neither"
 )
 
-FRICTION_MISSING = "phi_deg is missing: the failure mode depends on dip and friction"
+ANGLE_MISSING = " is missing: the failure mode depends on dip and friction"
+FRICTION_MISSING = f"phi_deg{ANGLE_MISSING}"
 
 UNSTABLE_AT_REST = (
     "the block is unstable at rest in {mode} (yield {k:.4g} g): it fails without an earthquake"
@@ -76,39 +98,9 @@ TOPPLES_AT_REST = (
     "rectangle atan(width/height), is {alpha3:.4g} deg: it fails without an earthquake"
 )
 
-LEANS_AT_REST = (
-    "the block is unstable at rest, backward over its heel: its base dips by {beta:g} deg, and the "
-    "angle of its heel is {alpha1:.4g} deg: it fails without an earthquake"
-)
-
-LOCKED_AT_REST = "the block is locked in {mode}: it cannot fail in this mode"
-
 NO_MODEL = "there is no fragility model of kind {kind}"
 
-NO_MODEL_OF_MODE = "there is no fragility model for its failure mode, {mode} (yield {k:.4g} g)"
-
-OTHER_MODE = (
-    "the {kind} model does not apply: the failure mode is {mode} (yield {k:.4g} g){instead}"
-)
-
-SLIDES = "the block slides (yield {k:.2g} g): give displacement_m, the displacement limit"
-
-COHESIVE = (
-    "cohesion_pa cannot be combined with {kind}: cohesion is lost at the first slip, which the "
-    f"model does not describe: {STATE_RESIDUAL}"
-)
-
-NO_UNIQUE_MOTION = (
-    "the motion of a rigid block with this geometry and friction is not unique: only its yield "
-    "acceleration is defined"
-)
-
-STEEP = (
-    "a block rocks about a corner whose critical angle is below 90 degrees: alpha3 - beta and "
-    "beta - alpha1 must be smaller"
-)
-
-TAKEN_TO_TOPPLE = Diagnostic(
+_TAKEN_TO_TOPPLE = Diagnostic(
     "no friction angle is given: the rectangle is assumed to topple, backed by a rock face; "
     "phi_deg determines the failure mode",
     "friction_not_given",
@@ -121,41 +113,40 @@ TAKEN_NOT_TO_SLIP = Diagnostic(
     "friction_not_given",
 )
 
-_STANDS_FREE = Diagnostic(NOT_BACKED, "not_backed")
-
-_WEAKER = (
-    "the block is not symmetric about the vertical: the answer is that of the symmetric block of "
-    "its weaker sense, {sense} (conservative); respond simulates the block itself"
-)
-
-_NOT_SLIDING = "displacement_m is ignored: the block is of kind {kind}"
-
 _INSTEAD = {
     "slide": "; use kind sliding with displacement_m",
     "slump": "; use kind slumping",
     "confined_topple": "; use kind confined_toppling",
 }
 
-_RADIANS = "{name} = {{value:g}}° is unusually small: is it in radians? Angles are in degrees"
+
+STATES = UNSTABLE, LOCKED, SLIPS, NOT_UNIQUE, REJECTED = (
+    "unstable", "locked", "slides", "not_unique", "rejected",
+)  # fmt: skip
+"""Why a block has no model inputs: it is unstable or locked at rest, slides without a displacement
+limit, moves in no unique way, or is rejected for another reason."""
 
 
 class IssueCollector(Protocol):
     """Collects errors and warnings about blocks."""
 
-    def reject(self, holds: Any, text: str, *fields: str, **values: Any) -> None:
+    def reject(
+        self, holds: Any, text: str, /, *fields: str, state: str = REJECTED, **values: Any
+    ) -> None:
         """Reject blocks with a reason.
 
         Args:
             holds: whether, or which.
             text: the reason, with the names of values in braces.
             fields: fields that each interface prints in its own spelling.
+            state: which of :data:`STATES` they are in.
             values: the values, numbers or arrays.
         """
 
-    def unstable(self, holds: Any, text: str, **values: Any) -> None:
+    def unstable(self, holds: Any, text: str, /, **values: Any) -> None:
         """Mark blocks that are unstable at rest; arguments as for `reject`."""
 
-    def remark(self, holds: Any, text: Diagnostic, **values: Any) -> None:
+    def remark(self, holds: Any, text: Diagnostic, /, **values: Any) -> None:
         """Add a warning where a condition holds; the text may contain values."""
 
 
@@ -239,12 +230,11 @@ def shape_among(fields: Collection[str]) -> tuple[str, ...] | None:
 
 BOND = ("cohesion_pa", "density_kg_m3")
 
-
 PLANE_TEXTS = (*SPACE, "drainage")
 """Fields of planes that are words; of many blocks arrays of them."""
 
 PLANES_OF_A_SHAPE = (*PLANES[1:], "back_fracture", "kv", *BOND, *JOINT, "drainage")
-"""Fields that describe a block only beside its shape; the dip stands with numbers too."""
+"""Fields that describe a block only together with its shape; the dip stands with numbers too."""
 
 SIDES_AND_PLANES = (*(name for names in SHAPES for name in names), *PLANES_OF_A_SHAPE)
 
@@ -253,6 +243,16 @@ OF_A_SHAPE = ("block", *SPACE, *SIDES_AND_PLANES)
 
 IS_PLANE = frozenset({"beta_deg", *PLANES_OF_A_SHAPE})
 IS_SHAPE = frozenset({"beta_deg", *OF_A_SHAPE})
+
+
+def reject_parameters(fields: Collection[str], shape: tuple[str, ...]) -> None:
+    """Reject the parameters of a kind in addition to a geometry, () for that of a block."""
+    if numbers := [name for name in NUMBERS if name in fields]:
+        raise InputError(
+            f"{numbers[0]} cannot be combined with {(shape or ('a geometry',))[0]}: give one "
+            "description of the block",
+            fields=(numbers[0], *SIDES_AND_PLANES),
+        )
 
 
 def check_ranges(
@@ -270,8 +270,10 @@ def check_ranges(
         if is_friction or name == "beta_deg":
             least = LEAST_DEG if is_friction else LEAST_DIP_DEG
             small = (abs(value) > 0.0) & (abs(value) < least) & (value % 0.25 != 0.0)
-            text = Diagnostic(_RADIANS.format(name=name), "check_unit", fields=(name,))
-            issues.remark(small, text, value=value)
+            text = (
+                f"{name} = {{value:g}}° is unusually small: is it in radians? Angles are in degrees"
+            )
+            issues.remark(small, Diagnostic(text, "check_unit", fields=(name,)), value=value)
         in_range = QUANTITIES[name].range.holds(value)
         if in_range is True:  # a single number: no text is needed
             continue
@@ -305,9 +307,8 @@ def check_lengths(lengths: Mapping[str, Any], issues: IssueCollector) -> None:
 
 def check_size(p2: Any, issues: IssueCollector) -> None:
     """Warn of a p² [1/s²] outside the range of known blocks."""
-    text = Diagnostic(SMALL_P2, "check_unit")
     small = (p2 > 0.0) & (p2 < LEAST_P2)
-    issues.remark(small, text, value=p2, size=15.0 / (p2 + (small ^ True)))
+    issues.remark(small, SMALL_P2, value=p2, size=15.0 / (p2 + (small ^ True)))
 
 
 def size_questions(p2: Any, shape: tuple[int, ...] = ()) -> tuple[Diagnostic, ...]:
@@ -330,18 +331,12 @@ def size_questions(p2: Any, shape: tuple[int, ...] = ()) -> tuple[Diagnostic, ..
             return ()
         p2 = float(values.flat[small[0]])
         rows = small if shape else ()
-    text = SMALL_P2.format(value=p2, size=15.0 / p2)
-    return (Diagnostic(text, "check_unit", rows=rows),)
-
-
-SMALL_P2 = "Check the unit: p² = {value:.3g} s⁻² is a block of {size:.0f} m"
-
-SMALL_BLOCK = Diagnostic("Check the unit: the block measures {value:.2g} m", "check_unit")
+    return (SMALL_P2.replaced(text=SMALL_P2.format(value=p2, size=15.0 / p2), rows=rows),)
 
 
 def numbers_of_shape(
     facts: KindSpec,
-    judged: ModeShapes,
+    shapes: ModeShapes,
     displacement_m: Any,
     options: Mapping[str, Any],
     issues: IssueCollector,
@@ -350,100 +345,134 @@ def numbers_of_shape(
 
     Args:
         facts: the kind that answers.
-        judged: the shapes.
+        shapes: the shapes.
         displacement_m: displacements that are too far [m], NaN where none is stated.
         options: restitutions and standard deviations that are stated, by field.
         issues: hears why shapes cannot be answered for.
     """
     check_ranges({"displacement_m": displacement_m}, issues)
-    k, mode = judged.k, judged.mode
+    k, mode = shapes.k, shapes.mode
     words: dict[str, Any] = {"k": k, "mode": words_of_mode(mode), "kind": facts.kind}
-    angles = {"beta": judged.beta_deg, "alpha1": judged.body.alpha1_deg}
-    angles["alpha3"] = judged.body.alpha3_deg
+    angles = {"beta": shapes.beta_deg, "alpha1": shapes.body.alpha1_deg}
+    angles["alpha3"] = shapes.body.alpha3_deg
     forward_at_rest = TOPPLES_AT_REST if mode == "topple" else UNSTABLE_AT_REST
     issues.unstable(k <= 0.0, forward_at_rest, **words, **angles)
     if facts.mode != mode:
-        issues.reject(judged.taken, FRICTION_MISSING, "phi_deg")
-        words["instead"] = _INSTEAD.get(mode, "")
-        issues.reject(True, OTHER_MODE, "displacement_m", **words)
+        issues.reject(shapes.taken, FRICTION_MISSING, "phi_deg")
+        issues.reject(
+            True,
+            "the {kind} model does not apply: the failure mode is {mode} (yield {k:.4g} g)"
+            + _INSTEAD.get(mode, ""),
+            "displacement_m",
+            **words,
+        )
         return {}
     if not facts.parameters:
-        issues.reject(True, NO_MODEL_OF_MODE, **words)
+        issues.reject(
+            True, "there is no fragility model for its failure mode, {mode} (yield {k:.4g} g)",
+            **words,
+        )  # fmt: skip
         return {}
-    issues.reject(k == math.inf, LOCKED_AT_REST, **words)
-    issues.remark(judged.wet, UNDRAINED_NOTE)
-    single = isinstance(judged.body, Block)
+    issues.reject(
+        k == math.inf, "the block is locked in {mode}: it cannot fail in this mode", state=LOCKED,
+        **words,
+    )  # fmt: skip
+    issues.remark(shapes.wet, _UNDRAINED_NOTE)
+    single = isinstance(shapes.body, Block)
     functions: Elementwise[Any] = SCALAR if single else array_elementwise()
     for holds, warning, values in idealisations(
-        judged.body, mode, k, judged.beta_deg, judged.phi_deg, judged.phi_back_deg,
-        False if facts.free_standing else judged.backed, functions,
+        shapes.body, mode, k, shapes.beta_deg, shapes.phi_deg, shapes.phi_back_deg,
+        False if facts.free_standing else shapes.backed, functions,
     ):  # fmt: skip
-        issues.remark(holds & (judged.taken ^ True), warning, **values)
+        issues.remark(holds & (shapes.taken ^ True), warning, **values)
     if mode == "topple" and not facts.free_standing:
-        issues.remark(judged.bonded, COHESION_NOTE)
+        issues.remark(shapes.bonded, _COHESION_NOTE)
     if slips_on_base(facts):
-        issues.reject(judged.bonded, COHESIVE, "cohesion_pa", "phi_residual_deg", **words)
-        issues.reject(judged.rough, ROUGH, "jrc", "phi_residual_deg", **words)
-    if judged.pga_g is not None and mode in ("slide", "topple") and not facts.free_standing:
-        _say_what_gives_way(judged, issues)
+        text = (
+            "cohesion_pa cannot be combined with {kind}: cohesion is lost at the first slip, which "
+            f"the model does not describe: {STATE_RESIDUAL}"
+        )
+        issues.reject(shapes.bonded, text, "cohesion_pa", "phi_residual_deg", **words)
+        issues.reject(shapes.rough, ROUGH, "jrc", "phi_residual_deg", **words)
+    if shapes.pga_g is not None and mode in ("slide", "topple") and not facts.free_standing:
+        _say_what_gives_way(shapes, issues)
     if "ky" in facts.parameters:
-        issues.reject(displacement_m != displacement_m, SLIDES, "displacement_m", k=k)
-        dip_deg = dip_of_factor(judged)
+        issues.reject(
+            displacement_m != displacement_m,
+            "the block slides (yield {k:.2g} g): give displacement_m, the displacement limit",
+            "displacement_m",
+            state=SLIPS,
+            k=k,
+        )
+        dip_deg = dip_of_factor(shapes)
         return {"ky": k, "beta_deg": dip_deg, "displacement_m": displacement_m, **options}
-    ignored = Diagnostic(
-        _NOT_SLIDING.format(kind=facts.kind), "unused_input", fields=("displacement_m",)
-    )
-    issues.remark(displacement_m == displacement_m, ignored)
+    ignored = f"displacement_m is ignored: the block is of kind {facts.kind}"
+    note = Diagnostic(ignored, "unused_input", fields=("displacement_m",))
+    issues.remark(displacement_m == displacement_m, note)
     if facts.search_needs == "block":  # shape, friction and dip decide how it moves
-        p2 = p2_at_rest(judged, functions)
-        issues.reject(p2 != p2, NO_UNIQUE_MOTION)
+        p2 = p2_at_rest(shapes, functions)
+        issues.reject(
+            p2 != p2,
+            "the motion of a rigid block with this geometry and friction is not unique: only its "
+            "yield acceleration is defined",
+            state=NOT_UNIQUE,
+        )
         return {**dict(zip(facts.parameters, (k, p2), strict=True)), **options}
-    issues.remark(judged.taken, TAKEN_NOT_TO_SLIP if facts.free_standing else TAKEN_TO_TOPPLE)
-    issues.remark((judged.backed ^ True) & stands_free_of(facts, False), _STANDS_FREE)
+    issues.remark(shapes.taken, TAKEN_NOT_TO_SLIP if facts.free_standing else _TAKEN_TO_TOPPLE)
+    issues.remark((shapes.backed ^ True) & stands_free_of(facts, False), _STANDS_FREE)
     if not facts.free_standing:
-        return {"p2": judged.body.p2, "kr": k, **options}
-    body = judged.body
+        return {"p2": shapes.body.p2, "kr": k, **options}
     forward, backward, p2, default_restitution, least = rocking_at_rest(
-        tan_alpha1=body.tan_alpha1, tan_alpha3=body.tan_alpha3, half_s1_m=body.half_s1_m,
-        inertia_m2=body.inertia_m2, tan_beta=tan_deg(judged.beta_deg, functions),
-        functions=functions,
-    )  # fmt: skip
+        shapes.body, tan_deg(shapes.beta_deg, functions), functions
+    )
     issues.unstable(forward <= 0.0, TOPPLES_AT_REST, **angles)
-    issues.unstable(backward <= 0.0, LEANS_AT_REST, **angles)
-    issues.reject(least <= 0.0, STEEP)
+    issues.unstable(
+        backward <= 0.0,
+        "the block is unstable at rest, backward over its heel: its base dips by {beta:g} deg, and "
+        "the angle of its heel is {alpha1:.4g} deg: it fails without an earthquake",
+        **angles,
+    )
+    issues.reject(
+        least <= 0.0,
+        "a block rocks about a corner whose critical angle is below 90 degrees: alpha3 - beta and "
+        "beta - alpha1 must be smaller",
+    )
     weaker = forward <= backward
     kr = functions.where(weaker, forward, backward)
     uneven = abs(forward - backward) > 1e-6 * (1.0 + forward * backward) * abs(forward)
     for holds, sense in ((weaker, "forward"), (weaker ^ True, "backward")):
-        text = Diagnostic(_WEAKER.format(sense=sense), "not_symmetric")
-        issues.remark(uneven & holds, text)
+        text = (
+            "the block is not symmetric about the vertical: the answer is that of the symmetric "
+            f"block of its weaker sense, {sense} (conservative); respond simulates the block itself"
+        )
+        issues.remark(uneven & holds, Diagnostic(text, "not_symmetric"))
     restitution = options.get("restitution", default_restitution)
     restitution = functions.where(restitution == restitution, restitution, default_restitution)
     return {**options, "p2": p2, "kr": kr, "restitution": restitution}
 
 
-def _say_what_gives_way(judged: ModeShapes, issues: IssueCollector) -> None:
+def _say_what_gives_way(shapes: ModeShapes, issues: IssueCollector) -> None:
     """Warn of the PGA at which the heel of a slide lifts or the toe of a topple slips."""
     about, threshold_g = (
-        (HEEL_TIPS, heel_tips_g) if judged.mode == "slide" else (TOE_SLIPS, toe_slips_g)
+        (HEEL_TIPS, heel_tips_g) if shapes.mode == "slide" else (TOE_SLIPS, toe_slips_g)
     )
-    at_g = threshold_g(judged.body, judged.beta_deg, judged.phi_deg, judged.push)
-    exceeded = (judged.pga_g > at_g) & (judged.pga_g > judged.k) & (judged.taken ^ True)
+    at_g = threshold_g(shapes.body, shapes.beta_deg, shapes.phi_deg, shapes.push)
+    exceeded = (shapes.pga_g > at_g) & (shapes.pga_g > shapes.k) & (shapes.taken ^ True)
     issues.remark(exceeded, about, threshold=at_g)
 
 
-def dip_of_factor(judged: ModeShapes) -> Any:
+def dip_of_factor(shapes: ModeShapes) -> Any:
     """Return the dip [deg] for the displacement factor of sliding blocks with water.
 
     Models derive cos(φ - b)/cos φ from k_y and a dip b with φ = b + atan k_y. Water lessens k_y and
     leaves the factor F as it is: b = acos(cos(atan k_y)/F) - atan k_y. Where F is less than any of
     that k_y, b is that of the least, which is conservative.
     """
-    if judged.wet is False or judged.k is None:
-        return judged.beta_deg
+    if shapes.wet is False or shapes.k is None:
+        return shapes.beta_deg
     trigonometry: Any = math
     functions: Elementwise[Any] = SCALAR
-    if not isinstance(judged.body, Block):
+    if not isinstance(shapes.body, Block):
         import numpy as np
 
         trigonometry, functions = np, array_elementwise()
@@ -452,19 +481,19 @@ def dip_of_factor(judged: ModeShapes) -> Any:
         if trigonometry is math
         else (trigonometry.arccos, trigonometry.arctan)
     )
-    phi, beta = (trigonometry.radians(angle) for angle in (judged.phi_deg, judged.beta_deg))
-    steep = functions.where(abs(judged.k) < math.inf, arctan(judged.k), 0.0)
+    phi, beta = (trigonometry.radians(angle) for angle in (shapes.phi_deg, shapes.beta_deg))
+    steep = functions.where(abs(shapes.k) < math.inf, arctan(shapes.k), 0.0)
     cosine = trigonometry.cos(steep) * trigonometry.cos(phi) / trigonometry.cos(phi - beta)
     dip = trigonometry.degrees(arccos(functions.where(cosine < 1.0, cosine, 1.0)) - steep)
-    return functions.where(judged.wet, dip, judged.beta_deg)
+    return functions.where(shapes.wet, dip, shapes.beta_deg)
 
 
-def p2_at_rest(judged: ModeShapes, functions: Elementwise[Any]) -> Any:
+def p2_at_rest(shapes: ModeShapes, functions: Elementwise[Any]) -> Any:
     """Return p_s² of slumps or p_ct² of confined topples [1/s²]; NaN where the motion is not
     unique.
     """
-    body = judged.body
-    slumps = judged.mode == "slump"
+    body = shapes.body
+    slumps = shapes.mode == "slump"
     trigonometry: Any = math
     if not isinstance(body, Block):
         import numpy as np
@@ -476,17 +505,16 @@ def p2_at_rest(judged: ModeShapes, functions: Elementwise[Any]) -> Any:
             "has no corner at the heel"
         )
     elif not body.is_parallelogram:  # its centroid does not lie between heel and toe
-        from rbfrag.solver.mechanism import shaken_mechanism
         from rbfrag.solver.models import model_of_mode
+        from rbfrag.solver.simulation import shaken_mechanism
 
         p2 = shaken_mechanism(
-            model_of_mode(judged.mode), body, beta_deg=judged.beta_deg, phi_deg=judged.phi_deg,
-            phi_back_deg=judged.phi_back_deg,
+            model_of_mode(shapes.mode), body, beta_deg=shapes.beta_deg, phi_deg=shapes.phi_deg,
+            phi_back_deg=shapes.phi_back_deg,
         ).p2  # fmt: skip
         return p2 if p2 > 0.0 else math.nan
     return two_contacts_at_rest(
-        confined=not slumps, alpha1_deg=body.alpha1_deg, alpha3_deg=body.alpha3_deg,
-        gamma_deg=body.gamma_deg, r1_m=body.r1_m, r3_m=body.r3_m, beta_deg=judged.beta_deg,
-        phis_deg=(judged.phi_deg, judged.phi_back_deg), functions=functions,
+        body, confined=not slumps, beta_deg=shapes.beta_deg,
+        phis_deg=(shapes.phi_deg, shapes.phi_back_deg), functions=functions,
         trigonometry=trigonometry,
     )  # fmt: skip

@@ -13,11 +13,21 @@ from functools import cache
 from typing import NamedTuple
 
 from rbfrag.errors import InputError
+from rbfrag.files import is_numeral
 from rbfrag.results.diagnostic import Diagnostic
 from rbfrag.solver.kinds import KINDS
 from rbfrag.solver.stability.joint import DRAINED, UNDRAINED
 from rbfrag.vocabulary import headers
-from rbfrag.vocabulary.quantities import COLUMNS, INPUTS, INTENSITY, QUANTITIES, column_of, word_of
+from rbfrag.vocabulary.quantities import (
+    COLUMNS,
+    INPUTS,
+    INTENSITY,
+    MEASURED,
+    ONLY_PREDICT,
+    QUANTITIES,
+    column_of,
+    word_of,
+)
 
 _PRESSURES = {"pa": 1.0, "kpa": 1e3, "mpa": 1e6, "n/m2": 1.0, "kn/m2": 1e3, "mn/m2": 1e6}
 
@@ -187,11 +197,6 @@ def _called(text: str, unit: str | None = None) -> HeaderMatch | None:
     return HeaderMatch(field, unit or default, column)
 
 
-def kind_named(text: str) -> str | None:
-    """Return the kind of failure named by a word in any of five languages; None if unknown."""
-    return _KINDS.get(" ".join(normalized_words(text)))
-
-
 def yes_or_no(text: str) -> bool | None:
     """Return whether a cell means yes; None if it means neither yes nor no."""
     return headers.ANSWERS.get(" ".join(normalized_words(text)))
@@ -214,7 +219,8 @@ def kinds_in(cells: Sequence[str], header: str, source: object) -> list[str] | N
     Raises:
         InputError: some words name a kind and some do not, or one is misspelled.
     """
-    by_word = {cell: kind_named(cell) for cell in dict.fromkeys(cells) if cell.strip()}
+    words = (cell for cell in dict.fromkeys(cells) if cell.strip())
+    by_word = {cell: _KINDS.get(" ".join(normalized_words(cell))) for cell in words}
     rest = [word for word, kind in by_word.items() if kind is None]
     near = next((w for w in rest for k in _KINDS if _is_near(w.lower(), k)), None)
     if near is not None or (rest and len(rest) < len(by_word)):
@@ -254,7 +260,8 @@ def header_row(rows: Sequence[Sequence[object]]) -> int:
     below = [
         i
         for i, fields in enumerate(row_fields)
-        if _has_number(fields) and not any(map(_is_number, rows[i]))
+        if _has_number(fields)
+        and not any(is_numeral(_text(cell).replace(",", ".")) for cell in rows[i])
     ]
     two = [i for i in below if len(row_fields[i]) > 1]
     return two[0] if two else below[0] if len(below) == 1 else first
@@ -276,14 +283,6 @@ def _has_number(fields: Collection[str]) -> bool:
 
 def _text(cell: object) -> str:
     return "" if cell is None else str(cell).strip()
-
-
-def _is_number(cell: object) -> bool:
-    try:
-        float(_text(cell).replace(",", "."))
-    except ValueError:
-        return False
-    return True
 
 
 class Header(NamedTuple):
@@ -332,6 +331,8 @@ class Header(NamedTuple):
             InputError: the first such column, with the field that may be meant.
         """
         for text, multiplier in self.unused.items():
+            if multiplier in MEASURED:
+                raise InputError(f"{source}: {ONLY_PREDICT.format(text)}")
             if multiplier in MULTIPLIERS:
                 raise InputError(
                     f"{source}: the column {text!r} is not used by this answer: remove it, or use "

@@ -24,7 +24,7 @@ TOML::
 
 With ``[face] plane = "70/090"`` base and back may be planes in space (dip/dip direction) in the
 place of their dips: ``plane = "25/102"``, a list of measured ones, or a CSV of dip and dip
-direction beside the file.
+direction next to the file.
 
 CSV: the columns ``variable,distribution`` and, as needed, ``value, mean, median, sd, sd_ln, kappa,
 low, high, values``, one variable a row such as ``base.dip_deg,normal``; measurements stand in
@@ -42,7 +42,7 @@ from pathlib import Path
 from rbfrag.errors import InputError
 from rbfrag.files import csv_rows, source_text, toml_document
 from rbfrag.rockmasses.joint_sets import DRAINAGE, RockMass
-from rbfrag.rockmasses.orientations import read_planes
+from rbfrag.solver.block.planes import plane_of
 
 COLUMNS = (
     "variable", "distribution", "value", "mean", "median", "sd", "sd_ln", "kappa", "low", "high",
@@ -72,18 +72,38 @@ def read_rock_mass(path: str | os.PathLike[str]) -> RockMass:
     text = source_text(source, "a rock mass", _LARGEST_BYTES)
     try:
         described = _from_csv(text) if suffix == ".csv" else _flat(toml_document(text))
-        return RockMass.of(_with_measured(described, source.parent))
+        for name, value in described.items():
+            is_plane = name.endswith(_PLANE) and isinstance(value, str)
+            if is_plane and str(value).lower().endswith(".csv"):
+                described[name] = read_planes(source.parent / str(value))
+        return RockMass.of(described)
     except InputError as error:
         raise InputError(f"{source}: {error}") from None
 
 
-def _with_measured(description: dict[str, object], folder: Path) -> dict[str, object]:
-    """Return a description with the planes of the tables it names."""
-    for name, value in description.items():
-        is_plane = name.endswith(_PLANE) and isinstance(value, str)
-        if is_plane and str(value).lower().endswith(".csv"):
-            description[name] = read_planes(folder / str(value))
-    return description
+def read_planes(path: str | os.PathLike[str]) -> list[str]:
+    """Return the planes of a CSV of dip and dip direction [deg], as texts dip/direction.
+
+    Raises:
+        InputError: the file cannot be read, or a row is no plane; the line is named.
+    """
+    source = Path(path)
+    planes: list[str] = []
+    for line, cells in csv_rows(source_text(source, "planes", _LARGEST_BYTES)):
+        row = [cell.strip() for cell in cells]
+        if not any(row) or row[0].startswith("#"):
+            continue
+        try:
+            float(row[0])
+        except ValueError:
+            if not planes:  # a header
+                continue
+        try:
+            planes.append("/".join(row[:2]))
+            plane_of(planes[-1], "plane")
+        except InputError as error:
+            raise InputError(f"{source}: line {line}: {error}") from None
+    return planes
 
 
 def rock_mass_of_toml(text: str) -> RockMass:
@@ -134,7 +154,12 @@ def _from_csv(text: str) -> dict[str, object]:
         if not any(row) or row[0].startswith("#"):
             continue
         if not header:
-            header = _header(row, line)
+            header, unknown = row, [name for name in row if name not in COLUMNS]
+            if "variable" not in row or unknown or len(set(row)) < len(row):
+                raise InputError(
+                    f"line {line}: the columns are {','.join(row)}, but a rock mass has variable "
+                    f"and any of {','.join(COLUMNS[1:])}, each once"
+                )
             continue
         if len(row) > len(header):
             raise InputError(f"line {line}: {len(row)} cells under {len(header)} columns")
@@ -144,16 +169,6 @@ def _from_csv(text: str) -> dict[str, object]:
             raise InputError(f"line {line}: {variable} is given twice")
         description[variable] = _row(keys, variable, line)
     return description
-
-
-def _header(row: list[str], line: int) -> list[str]:
-    unknown = [name for name in row if name not in COLUMNS]
-    if "variable" not in row or unknown or len(set(row)) < len(row):
-        raise InputError(
-            f"line {line}: the columns are {','.join(row)}, but a rock mass has variable and "
-            f"any of {','.join(COLUMNS[1:])}, each once"
-        )
-    return row
 
 
 def _row(keys: dict[str, str], variable: str, line: int) -> object:

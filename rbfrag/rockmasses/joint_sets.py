@@ -11,23 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbfrag.errors import InputError
-from rbfrag.rockmasses.distributions import Distribution
-from rbfrag.rockmasses.orientations import in_section
+from rbfrag.rockmasses.distributions import Distribution, in_section
 from rbfrag.solver.block.arrays import BlockArray
 from rbfrag.solver.results import FloatArray
+from rbfrag.solver.stability import joint as joints
 from rbfrag.solver.stability.arrays import FLOATS, OF_JOINT, StabilityArray, stability_arrays
 from rbfrag.solver.stability.arrays import water_held_m as held_m
-from rbfrag.solver.stability.joint import (
-    ASSUMED_DENSITY,
-    DRAINED,
-    NO_FRACTURE,
-    ROCK_KG_M3,
-    UNDRAINED,
-    is_drained,
-    reject_half,
-)
 from rbfrag.solver.stability.modes import MODES, STATES, ModeName, StateName
-from rbfrag.solver.stability.residual_strength import ENDED
 
 REALISATIONS = 20_000
 """Blocks that are drawn when nothing else is asked for."""
@@ -54,19 +44,6 @@ class Variable(NamedTuple):
     high: float
     from_low: bool = False
     default: float = math.nan
-
-    def permits(self, value: float) -> bool:
-        """Return whether a value lies in the permitted range."""
-        return self.low < value < self.high or (self.from_low and value == self.low)
-
-    @property
-    def range_text(self) -> str:
-        """Permitted range for messages."""
-        if math.isinf(self.high):
-            return f"{self.low:g} or more" if self.from_low else f"above {self.low:g}"
-        if self.from_low:
-            return f"from {self.low:g} to below {self.high:g}"
-        return f"between {self.low:g} and {self.high:g}"
 
 
 VARIABLES: dict[str, Variable] = {
@@ -138,7 +115,7 @@ class RockMass:
     realisations: int = REALISATIONS
     seed: int = SEED
     remarks: tuple[str, ...] = ()
-    drainage: str = UNDRAINED
+    drainage: str = joints.UNDRAINED
 
     @classmethod
     def of(cls, description: Mapping[str, object]) -> RockMass:
@@ -176,24 +153,24 @@ class RockMass:
                     "{ distribution = 'normal', mean = …, sd = … }"
                 )
         if _DENSITY not in variables and not variables.keys().isdisjoint(_WEIGHED):
-            remarks = (*remarks, ASSUMED_DENSITY)
+            remarks = (*remarks, joints.ASSUMED_DENSITY)
         drainage = description.get(DRAINAGE)
         if drainage is not None and _WATER not in variables:
             raise InputError(f"{DRAINAGE} requires {_WATER}")
-        drains = is_drained(drainage)
-        reject_half(*(variables.get(key) for key in _ROUGHNESS))
+        drains = joints.is_drained(drainage)
+        joints.reject_half(*(variables.get(key) for key in _ROUGHNESS))
         back_fracture = description.get("block.back_fracture", True)
         if not isinstance(back_fracture, bool):
             raise InputError(f"block.back_fracture = {back_fracture!r}: use true or false")
         if _WATER in variables and not back_fracture:
-            raise InputError(NO_FRACTURE)
+            raise InputError(joints.NO_FRACTURE)
         return cls(
             variables,
             back_fracture,
             checked_count(description.get("realisations", REALISATIONS), "realisations"),
             checked_seed(description.get("seed", SEED), "seed"),
             remarks,
-            DRAINED if drains else UNDRAINED,
+            joints.DRAINED if drains else joints.UNDRAINED,
         )
 
     def draw(self, n: int, seed: int) -> dict[str, FloatArray]:
@@ -233,7 +210,7 @@ class RockMass:
         s1, s2 = drawn["base.spacing_m"] * factor, drawn["back.spacing_m"] * factor
         phi_back = drawn.get(_BACK_FRICTION, phi)
         gamma = back_dip - beta
-        density = drawn.get(_DENSITY, np.full(n, ROCK_KG_M3))
+        density = drawn.get(_DENSITY, np.full(n, joints.ROCK_KG_M3))
         cohesion, water = (drawn.get(key, np.zeros(n)) for key in (_COHESION, _WATER))
         reason = np.zeros(n, dtype=np.int8)
         # Slivers come last: where another reason holds there is no block to be one.
@@ -288,13 +265,15 @@ class RockMass:
             first = on_joint(joint, phi, phi_back)
             if _RESIDUAL not in drawn:
                 return first
-            residual_joint = {name: values for name, values in joint.items() if name not in ENDED}
+            residual_joint = {
+                name: values for name, values in joint.items() if name not in joints.ENDED
+            }
             residual = drawn[_RESIDUAL]
             return replace(first, after_slip=on_joint(residual_joint, residual, residual))
 
         # drained blocks are dry ones
         dry = {name: values for name, values in joint.items() if name != "water_m"}
-        drains = self.drainage == DRAINED
+        drains = self.drainage == joints.DRAINED
         realisations = realised(dry if drains else joint)
         stability, residual_stability = realisations.stability, realisations.in_time.stability
         codes, sliver = stability.reason_code, len(IMPOSSIBLE) - 1
@@ -455,7 +434,15 @@ def _law(key: str, variable: Variable, description: object) -> Distribution:
         law = Distribution.of(description, angle=key.endswith("_deg"))
     except InputError as error:
         raise InputError(f"{key}: {error}") from None
+    low, high = variable.low, variable.high
     for centre in law.centres:
-        if not variable.permits(centre):
-            raise InputError(f"{key}: {centre:.10g} is out of range: give {variable.range_text}")
+        if low < centre < high or (variable.from_low and centre == low):
+            continue
+        if math.isinf(high):
+            allowed = f"{low:g} or more" if variable.from_low else f"above {low:g}"
+        elif variable.from_low:
+            allowed = f"from {low:g} to below {high:g}"
+        else:
+            allowed = f"between {low:g} and {high:g}"
+        raise InputError(f"{key}: {centre:.10g} is out of range: give {allowed}")
     return law

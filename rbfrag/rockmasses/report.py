@@ -1,20 +1,22 @@
-"""A rock mass as scripts read it: a dictionary of plain values, and columns of the block table."""
+"""A rock mass and its failures as scripts read them: dictionaries, and columns of block tables."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rbfrag.results.diagnostic import Diagnostic, with_prefix
-from rbfrag.rockmasses.counts import EqualCounts, ModeCount, StateCount
+from rbfrag.rockmasses.counts import EqualCounts, ModeCount, ScaleFailures, StateCount
 from rbfrag.rockmasses.joint_sets import Realisations
-from rbfrag.rockmasses.scenario import Average, Scenario
+from rbfrag.rockmasses.scenario import Scenario
+from rbfrag.rockmasses.shaking import OPEN, OUTCOMES, ShakenMass
+from rbfrag.solver.kinds import BY_MECHANICS, FOLLOWED
+from rbfrag.solver.quantity import json_value
 from rbfrag.solver.stability.joint import IS_DRAINED, NO_EFFECT_OF_COHESION, STAYS_UNDRAINED
-from rbfrag.solver.stability.modes import MODES, STATES, ModeName
+from rbfrag.solver.stability.modes import MODES, STATES, ModeName, words_of_mode
 
 COUNTS = ("count", "share", "has_model", "unstable", "in_domain")
 DRAWN = ("gamma_deg", "beta_deg", "phi_deg", "phi_back_deg", "s1_m", "s2_m")
@@ -58,13 +60,7 @@ def as_dict(
             }
             for mode, count in counts.items()
         },
-        "crossings": [
-            {
-                name: value if isinstance(value, str) or math.isfinite(value) else None
-                for name, value in vars(crossing).items()
-            }
-            for crossing in crossings
-        ],
+        "crossings": [json_value(crossing) for crossing in crossings],
         "scenario": None if answer is None else _scenario(answer),
         "shaking": None if shaking is None else dict(shaking),
         "warnings": mass_warnings(realisations, answer, in_motion=bool(answer or shaking)),
@@ -87,23 +83,18 @@ def _scenario(answer: Scenario) -> dict[str, Any]:
         "modes": {
             mode.mode: {
                 **{name: getattr(mode, name) for name in COUNTS},
-                **_average(mode.covered),
-                "drained": None if mode.drained is None else _average(mode.drained),
+                **mode.covered.as_dict(),
+                "drained": None if mode.drained is None else mode.drained.as_dict(),
             }
             for mode in answer.modes
         },
         "covered_share": answer.covered_share,
         "uncovered_share": dict(answer.uncovered_share),
         "covered_only": {
-            **_average(answer.covered),
-            "drained": None if drained is None else _average(drained.covered),
+            **answer.covered.as_dict(),
+            "drained": None if drained is None else drained.covered.as_dict(),
         },
     }
-
-
-def _average(average: Average) -> dict[str, Any]:
-    values = dict(vars(average))
-    return {"covered": values.pop("count"), **values}
 
 
 def mass_warnings(
@@ -219,3 +210,79 @@ def _names(
     names: tuple[str, ...], codes: NDArray[np.int8], is_block: NDArray[np.bool_]
 ) -> NDArray[np.object_]:
     return np.array([*names, ""], dtype=object)[np.where(is_block, codes, -1)]
+
+
+def failures_as_dict(
+    shaken: ShakenMass, scales: Sequence[ScaleFailures], level: float
+) -> dict[str, Any]:
+    """Return the answer under the keys of the JSON contract."""
+    shaking = shaken.shaking
+    return {
+        "motion": shaking.motion.label,
+        "vertical": None if shaking.vertical is None else shaking.vertical.label,
+        "polarity": shaking.polarity,
+        "displacement_limit_m": shaken.limits.displacement_m,
+        "rotation_limit_deg": shaken.limits.rotation_deg,
+        "level": level,
+        "runs": shaken.runs,
+        "scales": [
+            {
+                "scale": result.scale,
+                "pga_g": result.pga_g,
+                "pgv_m_s": result.scale * shaking.motion.pgv_m_s,
+                "modes": {mode: of_mode.as_dict() for mode, of_mode in result.modes.items()},
+                "all": result.total.as_dict(),
+                "final_modes": final_modes(shaken, i),
+            }
+            for i, result in enumerate(scales)
+        ],
+    }
+
+
+def final_modes(shaken: ShakenMass, i: int) -> dict[ModeName, dict[str, int]]:
+    """Return the number of blocks by initial and final mode at one scale; ``none``: never moved."""
+    names = (*MODES, "none")
+    table = {}
+    for mode in MODES:
+        blocks = shaken.realisations.of_mode(mode)
+        if blocks.any():
+            counts = np.bincount(shaken.final_code[i, blocks] % len(names), minlength=len(names))
+            table[mode] = dict(zip(names, counts.tolist(), strict=True))
+    return table
+
+
+def failure_warnings(shaken: ShakenMass) -> list[str]:
+    """Return warnings about the motion, and about blocks with their number."""
+    by_mode = {mode: int(shaken.realisations.of_mode(mode).sum()) for mode in MODES}
+    return [
+        *shaken.warnings,
+        *(
+            Diagnostic(
+                f"{count} of {by_mode[mode]} blocks of mode {words_of_mode(mode)}: {text}",
+                "model_limits",
+            )
+            for (mode, text), count in shaken.about.items()
+        ),
+    ]
+
+
+def outcome_columns(shaken: ShakenMass) -> dict[str, NDArray[Any]]:
+    """Return the columns of the block table, one row per realisation and scale."""
+    columns = block_columns(shaken.realisations)
+    reason = columns.pop("reason")
+    scales = np.array(shaken.shaking.scales)
+    m, n = shaken.code.shape
+    names = np.array([*OUTCOMES, ""], dtype=object)
+    run = np.isin(names.astype(str), ("stays", "fails", *OPEN)) & (names != "bond_breaks")
+    ways = np.where(run, FOLLOWED, np.where(names == "", "", BY_MECHANICS)).astype(object)
+    return {
+        **{name: np.tile(values, m) for name, values in columns.items()},
+        "scale": np.repeat(scales, n),
+        "pga_g": np.repeat(shaken.pga_g, n),
+        "outcome": names[shaken.code.reshape(-1)],
+        "final_mode": np.array([*MODES, ""], dtype=object)[shaken.final_code.reshape(-1)],
+        "how": ways[shaken.code.reshape(-1)],
+        "displacement_m": shaken.displacement_m.reshape(-1),
+        "rotation_deg": np.degrees(shaken.rotation_rad.reshape(-1)),
+        "reason": np.tile(reason, m),
+    }

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from os import PathLike
@@ -29,10 +30,7 @@ from rbfrag.solver.kinds import BY_MECHANICS, kind_of_mode
 from rbfrag.solver.quantity import positive
 from rbfrag.solver.results import FloatArray
 from rbfrag.solver.stability.modes import MODES, STABLE, UNSTABLE, ModeName
-from rbfrag.solver.stability.toe_stability import HEEL_TIPS, TOE_SLIPS, heel_tips_g, toe_slips_g
-
-MODELLED: tuple[ModeName, ...] = ("topple",)
-"""Modes that a fragility model answers for."""
+from rbfrag.solver.stability.validity import HEEL_TIPS, TOE_SLIPS, heel_tips_g, toe_slips_g
 
 UNCOVERED = "no fragility model for this mode"
 BONDED = "cohesion: the first slip breaks the bond, which no model of this mode describes"
@@ -55,10 +53,28 @@ class Average:
     """
 
     count: int
-    probability: float | None
-    standard_error: float | None
-    ci_low: float | None
-    ci_high: float | None
+    probability: float | None = None
+    standard_error: float | None = None
+    ci_low: float | None = None
+    ci_high: float | None = None
+
+    @classmethod
+    def of(
+        cls, chosen: NDArray[np.bool_], probability: FloatArray, low: FloatArray, high: FloatArray
+    ) -> Average:
+        """Return the average over the selected blocks, shape (n,)."""
+        count = int(np.count_nonzero(chosen))
+        if count == 0:
+            return cls(0)
+        values = probability[chosen]
+        error = float(np.std(values, ddof=1)) / math.sqrt(count) if count > 1 else None
+        mean, mean_low, mean_high = (float(np.mean(x[chosen])) for x in (probability, low, high))
+        return cls(count, mean, error, mean_low, mean_high)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the average under the keys of the JSON contract."""
+        values = dict(vars(self))
+        return {"covered": values.pop("count"), **values}
 
 
 @dataclass(frozen=True)
@@ -136,7 +152,7 @@ class Scenario:
     def average(self, blocks: NDArray[np.bool_]) -> Average:
         """Return the average over the selected blocks, shape (n,), that have a probability."""
         covered = blocks & np.isfinite(self.probability)
-        return _average(covered, self.probability, self.ci_low, self.ci_high)
+        return Average.of(covered, self.probability, self.ci_low, self.ci_high)
 
 
 def scenario(
@@ -191,23 +207,23 @@ def scenario(
     described = (stability.state_code == STABLE) & ~after.ends_with_slip
     topples = after.of_mode("topple", "stable") & described
 
-    columns = np.full((5, realisations.n), np.nan)
-    probability, low, high, event_low, event_high = columns
-    in_domain = np.zeros(realisations.n, dtype=np.bool_)
+    names = ("probability", "ci_low", "ci_high", "event_low", "event_high")
+    answers: dict[str, NDArray[Any]] = {name: np.full(realisations.n, np.nan) for name in names}
+    answers["in_domain"] = np.zeros(realisations.n, dtype=np.bool_)
     reason = np.where(realisations.is_block, UNCOVERED, realisations.reason)
     reason[after.ends_with_slip] = BONDED
     reason[after.ends_with_slip & (after.jrc > 0.0)] = ENDS
     reason[realisations.is_block & (after.stability.state_code == UNSTABLE)] = SLIPS_ON
     reason[realisations.is_block & np.isposinf(stability.yield_acceleration)] = LOCKED
-    columns[:3, unstable] = 1.0
+    for name in names[:3]:
+        answers[name][unstable] = 1.0
     reason[unstable] = "unstable"
-    how = np.where(unstable, BY_MECHANICS, "").astype(object)
+    answers["how"] = np.where(unstable, BY_MECHANICS, "").astype(object)
+    answers["reason"] = reason
 
-    def fill(blocks: NDArray[np.bool_], answers: PredictionArray) -> None:
-        probability[blocks], reason[blocks] = answers.probability, answers.reason
-        low[blocks], high[blocks] = answers.ci_low, answers.ci_high
-        event_low[blocks], event_high[blocks] = answers.event_low, answers.event_high
-        in_domain[blocks], how[blocks] = answers.in_domain, answers.how
+    def fill(blocks: NDArray[np.bool_], predicted: PredictionArray) -> None:
+        for name, values in answers.items():
+            values[blocks] = getattr(predicted, name)
 
     answer: PredictionArray | None = None
     lacking: dict[ModeName, InputError] = {}
@@ -226,21 +242,21 @@ def scenario(
         answer = predicted
         fill(topples, answer)
 
-    modelled: set[ModeName] = set(MODELLED)
+    modelled: set[ModeName] = {"topple"}
     other_models: dict[ModeName, str] = {}
     if displacement_m is not None:
         for mode, blocks, question in _other_modes(
             after, described, measures, displacement_m, rotation_deg
         ):
             try:
-                answers = predict(**question, level=level, db=db)
+                predicted = predict(**question, level=level, db=db)
             except InputError as error:
                 lacking[mode], reason[blocks] = error, str(error)
                 continue
-            assert isinstance(answers, PredictionArray)
+            assert isinstance(predicted, PredictionArray)
             modelled.add(mode)
-            other_models[mode] = answers.model
-            fill(blocks, answers)
+            other_models[mode] = predicted.model
+            fill(blocks, predicted)
         # their models exist, but not for what ends with the first slip
         ended = np.isin(reason, (BONDED, ENDS, SLIPS_ON))
         modelled |= {m for m in UNANSWERED if np.any(realisations.of_mode(m) & ended)}
@@ -248,7 +264,8 @@ def scenario(
     if lacking and answer is None and not other_models:
         raise next(iter(lacking.values()))
     drained: Scenario | None = None
-    covered = np.isfinite(probability)
+    bounds = [answers[name] for name in names[:3]]
+    covered = np.isfinite(answers["probability"])
     gives_way = (
         _what_gives_way(after, described & covered, measures["pga_g"])
         if "pga_g" in measures
@@ -275,8 +292,8 @@ def scenario(
                     share=count / realisations.n_blocks,
                     has_model=mode in modelled,
                     unstable=int(np.count_nonzero(blocks & unstable)),
-                    covered=_average(blocks & covered, probability, low, high),
-                    in_domain=int(np.count_nonzero(blocks & in_domain)),
+                    covered=Average.of(blocks & covered, *bounds),
+                    in_domain=int(np.count_nonzero(blocks & answers["in_domain"])),
                     drained=None if drained is None else drained.average(blocks),
                 )
             )
@@ -294,17 +311,10 @@ def scenario(
         method=getattr(answer, "method", None),
         level=level,
         modes=tuple(modes),
-        covered=_average(covered, probability, low, high),
+        covered=Average.of(covered, *bounds),
         covered_share=int(np.count_nonzero(covered)) / realisations.n_blocks,
         uncovered_share=missing,
-        probability=probability,
-        ci_low=low,
-        ci_high=high,
-        event_low=event_low,
-        event_high=event_high,
-        in_domain=in_domain,
-        how=how,
-        reason=reason,
+        **answers,
         warnings=(*warnings, *gives_way, *no_bound),
         other_models=other_models,
         drained=drained,
@@ -332,8 +342,9 @@ def _other_modes(
     slides = realisations.of_mode("slide", "stable") & described
     with np.errstate(all="ignore"):
         dip_deg = dip_of_factor(_shapes(realisations, "slide"))
-    slide = {"ky": k[slides], "beta_deg": dip_deg[slides], "displacement_m": distance}
-    questions: list[tuple[ModeName, NDArray[np.bool_], dict[str, Any]]] = [("slide", slides, slide)]
+    if slides.any():
+        slide = {"ky": k[slides], "beta_deg": dip_deg[slides], "displacement_m": distance}
+        yield "slide", slides, {**slide, **motion}
     criteria: dict[ModeName, dict[str, Any]] = {"slump": {"rotation_deg": rotation_deg}}
     if rotation_deg is None:
         criteria["confined_topple"] = {}
@@ -341,12 +352,9 @@ def _other_modes(
         with np.errstate(all="ignore"):
             p2 = p2_at_rest(_shapes(realisations, mode), array_elementwise())
         moves = realisations.of_mode(mode, "stable") & described & np.isfinite(p2)
-        names = kind_of_mode(mode).parameters
-        numbers = zip(names, (k[moves], p2[moves]), strict=True)
-        questions.append((mode, moves, {**dict(numbers), **criterion}))
-    for mode, chosen, block in questions:
-        if chosen.any():
-            yield mode, chosen, {**block, **motion}
+        if moves.any():
+            numbers = zip(kind_of_mode(mode).parameters, (k[moves], p2[moves]), strict=True)
+            yield mode, moves, {**dict(numbers), **criterion, **motion}
 
 
 def _shapes(realisations: Realisations, mode: ModeName) -> ModeShapes:
@@ -391,23 +399,6 @@ def _what_gives_way(
             yield about.replaced(text=f"{prefix}{text}")
 
 
-def _average(
-    chosen: NDArray[np.bool_], probability: FloatArray, low: FloatArray, high: FloatArray
-) -> Average:
-    count = int(np.count_nonzero(chosen))
-    if count == 0:
-        return Average(0, None, None, None, None)
-    values = probability[chosen]
-    error = float(np.std(values, ddof=1)) / math.sqrt(count) if count > 1 else None
-    return Average(
-        count=count,
-        probability=float(np.mean(values)),
-        standard_error=error,
-        ci_low=float(np.mean(low[chosen])),
-        ci_high=float(np.mean(high[chosen])),
-    )
-
-
 _FOR_SLIDES = ": displacement_m, how far is too far for slides [m], gives them one"
 
 UNANSWERED: Mapping[ModeName, str] = {
@@ -432,10 +423,10 @@ def _warnings(
     )
     warnings: list[str] = [Diagnostic(text, "no_answer") for text in texts]
     reasons, counts = np.unique(reason.astype(str), return_counts=True)
-    tally: dict[str, int] = {}
+    tally: Counter[str] = Counter()
     for text, count in zip(reasons.tolist(), counts.tolist(), strict=True):
         for sentence in filter(None, text.split("; ")):
-            tally[sentence] = tally.get(sentence, 0) + count
+            tally[sentence] += count
     total = reason.size
     return warnings + [
         Diagnostic(f"{count} of {total} toppling blocks: {sentence}", "block_reasons")

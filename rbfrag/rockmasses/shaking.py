@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import Any, TypedDict
 
 import numpy as np
@@ -21,17 +22,8 @@ from rbfrag.solver.kind import RunEnd, Runner, SupportedBlock
 from rbfrag.solver.models import model_of_mode
 from rbfrag.solver.quantity import positive
 from rbfrag.solver.results import FloatArray, Outcome
-from rbfrag.solver.stability import modes as mechanism
-from rbfrag.solver.stability.modes import (
-    CONFINED_TOPPLE,
-    DRY,
-    MODES,
-    SLIDE,
-    SLUMP,
-    TOPPLE,
-    ModeName,
-)
-from rbfrag.solver.stability.single import judged, push_of
+from rbfrag.solver.stability import modes
+from rbfrag.solver.stability.single import assess_stability, push_of
 
 OUTCOMES = (
     "at_rest", "stays", "fails", "unstable", "locked",
@@ -89,9 +81,9 @@ class FailureLimits:
         if end.outcome is Outcome.TOPPLED:
             return FAILS
         peak = limit = None
-        if mode_code == SLIDE:
+        if mode_code == modes.SLIDE:
             peak, limit = end.peak_displacement_m, self.displacement_m
-        elif mode_code in (SLUMP, CONFINED_TOPPLE) and self.rotation_deg is not None:
+        elif mode_code in (modes.SLUMP, modes.CONFINED_TOPPLE) and self.rotation_deg is not None:
             peak, limit = end.peak_rad, math.radians(self.rotation_deg)
         if peak is not None and limit is not None:
             # What has happened before a model ends has happened.
@@ -164,7 +156,7 @@ class BlockOutcomes:
     displacement_m: FloatArray
     rotation_rad: FloatArray
     final_code: NDArray[np.int8]
-    about: dict[tuple[int, str], int]
+    about: Mapping[tuple[int, str], int]
     runs: int
 
 
@@ -172,12 +164,11 @@ def run_blocks(work: BlocksToRun) -> BlockOutcomes:
     """Simulate blocks, each at the scales at which it moves."""
     excitations = work.shaking.excitations()
     code = np.full(work.moves.shape, AT_REST, dtype=np.int8)
-    displacement_m = np.where(work.mode_code == MODES.index("topple"), np.nan, 0.0)
-    displacement_m = np.broadcast_to(displacement_m, code.shape).copy()
-    rotation_rad = np.where(work.mode_code == SLIDE, np.nan, 0.0)
-    rotation_rad = np.broadcast_to(rotation_rad, code.shape).copy()
+    zeros = np.zeros(code.shape)
+    displacement_m = np.where(work.mode_code == modes.TOPPLE, np.nan, zeros)
+    rotation_rad = np.where(work.mode_code == modes.SLIDE, np.nan, zeros)
     final_code = np.full(code.shape, NO_MODE, dtype=np.int8)
-    about: dict[tuple[int, str], int] = {}
+    about: Counter[tuple[int, str]] = Counter()
     for j in range(work.place.size):
         mode_code = int(work.mode_code[j])
         try:
@@ -194,9 +185,9 @@ def run_blocks(work: BlocksToRun) -> BlockOutcomes:
             displacement_m[i, j] = _or_nan(end.peak_displacement_m)
             rotation_rad[i, j] = _or_nan(end.peak_rad)
             if end.final_mode is not None:
-                final_code[i, j] = MODES.index(end.final_mode)
-        for sentence in dict.fromkeys(text for _, end in outcomes for text in end.about_block):
-            about[mode_code, sentence] = about.get((mode_code, sentence), 0) + 1
+                final_code[i, j] = modes.MODES.index(end.final_mode)
+        sentences = {text for _, end in outcomes for text in end.about_block}
+        about.update((mode_code, text) for text in sentences)
     return BlockOutcomes(
         place=work.place,
         code=code,
@@ -212,7 +203,7 @@ def _runner(work: BlocksToRun, j: int) -> Runner:
     """Return the runner of the model for the block's mode."""
     inputs: dict[str, Any] = {name: float(values[j]) for name, values in work.numbers.items()}
     block = Block.from_fractures(inputs.pop("s1_m"), inputs.pop("s2_m"), inputs.pop("gamma_deg"))
-    finding, planes, _ = judged(block, back_fracture=work.back_fracture, **inputs)
+    finding, planes, _ = assess_stability(block, back_fracture=work.back_fracture, **inputs)
     supported_block = SupportedBlock(
         block=block,
         beta_rad=math.radians(finding.beta_deg),
@@ -221,9 +212,9 @@ def _runner(work: BlocksToRun, j: int) -> Runner:
         back_fracture=work.back_fracture,
         cohesive=bool(planes.bond),
         yield_g=finding.k,
-        push=push_of(block, planes) or DRY,
+        push=push_of(block, planes) or modes.DRY,
     )
-    return model_of_mode(MODES[work.mode_code[j]]).runner(supported_block)
+    return model_of_mode(modes.MODES[work.mode_code[j]]).runner(supported_block)
 
 
 def _or_nan(value: float | None) -> float:
@@ -291,10 +282,10 @@ class ShakingPlan:
         code = self.code.copy()
         at_rest = (self.code == AT_REST) | (self.code == LOCKED)
         mode_code = self.realisations.in_time.stability.mode_code
-        displacement_m = np.where(at_rest & (mode_code != TOPPLE), 0.0, np.nan)
-        rotation_rad = np.where(at_rest & (mode_code != SLIDE), 0.0, np.nan)
+        displacement_m = np.where(at_rest & (mode_code != modes.TOPPLE), 0.0, np.nan)
+        rotation_rad = np.where(at_rest & (mode_code != modes.SLIDE), 0.0, np.nan)
         final_code = np.full(code.shape, NO_MODE, dtype=np.int8)
-        about: dict[tuple[int, str], int] = {}
+        about: Counter[tuple[int, str]] = Counter()
         runs = 0
         for answer in answers:
             code[:, answer.place] = np.where(
@@ -304,16 +295,16 @@ class ShakingPlan:
             rotation_rad[:, answer.place] = answer.rotation_rad
             final_code[:, answer.place] = answer.final_code
             runs += answer.runs
-            for key, count in answer.about.items():
-                about[key] = about.get(key, 0) + count
-        attributes = {item.name: getattr(self, item.name) for item in fields(self)}
+            about.update(answer.about)
         return ShakenMass(
-            **{**attributes, "code": code},
+            **{**vars(self), "code": code},
             displacement_m=displacement_m,
             rotation_rad=rotation_rad,
             final_code=final_code,
             runs=runs,
-            about={(MODES[mode], text): count for (mode, text), count in sorted(about.items())},
+            about={
+                (modes.MODES[mode], text): count for (mode, text), count in sorted(about.items())
+            },
         )
 
 
@@ -334,7 +325,7 @@ class ShakenMass(ShakingPlan):
     rotation_rad: FloatArray
     final_code: NDArray[np.int8]
     runs: int
-    about: Mapping[tuple[ModeName, str], int]
+    about: Mapping[tuple[modes.ModeName, str], int]
 
 
 class ShakingOptions(TypedDict, total=False):
@@ -383,8 +374,8 @@ def plan_shaking(
     stability = realisations.stability
     k = stability.yield_acceleration
     is_block, state = realisations.is_block, stability.state_code
-    stable = is_block & (state == mechanism.STABLE) & (k > 0.0) & np.isfinite(k)
-    locked = is_block & (state == mechanism.LOCKED)
+    stable = is_block & (state == modes.STABLE) & (k > 0.0) & np.isfinite(k)
+    locked = is_block & (state == modes.LOCKED)
     after = realisations.in_time
     residual_yield = after.stability.yield_acceleration
     excitations = shaking.excitations()
@@ -402,6 +393,14 @@ def plan_shaking(
         code[i, moves[i] & (residual_yield <= 0.0)] = FAILS
         moves[i] &= ~breaks & (residual_yield > 0.0) & np.isfinite(residual_yield)
         code[i, ~is_block] = NO_BLOCK
+    warnings = motion_remarks(motion, vertical, excitations[0])
+    if count := int(np.count_nonzero((code == BOND_BREAKS).any(axis=0))):
+        text = (
+            f"{count} blocks with cohesion or roughness are driven beyond their yield: the first "
+            "slip ends it, and no model describes the motion after it (outcome bond_breaks); with "
+            "friction.phi_residual_deg, the residual friction, they are run as they are after it"
+        )
+        warnings = (*warnings, Diagnostic(text, "bond_breaks"))
     return ShakingPlan(
         realisations=realisations,
         shaking=shaking,
@@ -409,20 +408,5 @@ def plan_shaking(
         code=code,
         moves=moves,
         pga_g=np.array([scaled_motion.pga_g for scaled_motion in excitations]),
-        warnings=(
-            *motion_remarks(motion, vertical, excitations[0]),
-            *_about_bonds(code == BOND_BREAKS),
-        ),
+        warnings=warnings,
     )
-
-
-def _about_bonds(breaks: NDArray[np.bool_]) -> tuple[str, ...]:
-    count = int(np.count_nonzero(breaks.any(axis=0)))
-    if not count:
-        return ()
-    text = (
-        f"{count} blocks with cohesion or roughness are driven beyond their yield: the first slip "
-        "ends it, and no model describes the motion after it (outcome bond_breaks); with "
-        "friction.phi_residual_deg, the residual friction, they are run as they are after it"
-    )
-    return (Diagnostic(text, "bond_breaks"),)

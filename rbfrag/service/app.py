@@ -15,14 +15,12 @@ from fastapi.staticfiles import StaticFiles
 from starlette.exceptions import HTTPException
 
 from rbfrag.errors import RbfragError
-from rbfrag.fragility.model_list import ModelList
-from rbfrag.fragility.model_selection import stored_rows
-from rbfrag.service import block, predict, uploads, vocabulary, work
+from rbfrag.fragility.model_selection import ModelList, stored_rows
+from rbfrag.service import operations, predict, work
 from rbfrag.service.documents import Health, ModelListed
-from rbfrag.service.guard import Guard
+from rbfrag.service.guard import CONTENT_TYPE, Guard, Metrics
 from rbfrag.service.problem import answer_error, documented
 from rbfrag.service.reading import Bodies, QueryRoute
-from rbfrag.service.request_records import CONTENT_TYPE, Metrics
 from rbfrag.service.settings import ServiceSettings
 from rbfrag.service.work import WorkerPool
 from rbfrag.solver.kinds import KINDS
@@ -74,7 +72,7 @@ def make_app(settings: ServiceSettings) -> FastAPI:
         if settings.early:
             pool.open().schedule(work.warm_up)
             # so that the first block of a page does not wait for its libraries
-            loading = asyncio.ensure_future(asyncio.to_thread(_load_models))
+            loading = asyncio.ensure_future(asyncio.to_thread(lambda: [*map(model_of_kind, KINDS)]))
         yield
         if settings.early:
             await loading
@@ -101,9 +99,7 @@ def make_app(settings: ServiceSettings) -> FastAPI:
     # straight to the application: a router that is included takes 10 µs more to find its route
     app.router.route_class = QueryRoute
     predict.add_routes(app.router, settings, pool)
-    block.add_routes(app.router)
-    uploads.add_routes(app.router, settings, pool)
-    vocabulary.add_routes(app.router)
+    operations.add_routes(app.router, settings, pool)
 
     @app.get(
         "/v1/models",
@@ -117,7 +113,7 @@ def make_app(settings: ServiceSettings) -> FastAPI:
         Where the service was given no database and there is none, these are the models that are
         shipped with rbfrag.
         """
-        # read anew each time, and from a server if there is one
+        # read again each time, and from a server if there is one
         rows = await work.in_thread(settings.time_limit, stored_rows, settings.db)
         return ModelList(rows).as_dict()
 
@@ -143,8 +139,3 @@ def make_app(settings: ServiceSettings) -> FastAPI:
             allow_headers=["Authorization", "Content-Type"],
         )
     return app
-
-
-def _load_models() -> None:
-    for kind in KINDS:
-        model_of_kind(kind)

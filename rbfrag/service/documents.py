@@ -141,14 +141,32 @@ class _Answer(_Document):
     text: TextDocument | None = None
 
 
+class SourceDocument(_Document):
+    """A source of uncertainty, and its fraction of the variance of the probit of P."""
+
+    source: str
+    fraction: float
+
+
+class SensitivityDocument(_Document):
+    """P where a field is off by a usual error, a number of degrees or a fraction of a length."""
+
+    field: str
+    step: float
+    low: float
+    high: float
+
+
 @keys_of(Prediction, names=OF_EACH_MODEL)
 class ModelAnswer(_Document):
     """The answer of one model whose measures are available."""
 
     recommended: bool
+    ci_low: float | None
+    ci_high: float | None
 
 
-@keys_of(Prediction, omitted=("inputs", "alternatives"))
+@keys_of(Prediction, omitted=("inputs", "alternatives", "drawn"))
 class PredictAnswer(_Answer):
     """Probability of failure of a block; the same JSON as `rbfrag predict`.
 
@@ -158,7 +176,17 @@ class PredictAnswer(_Answer):
     asked for and where that is unknown. `block_sd` is the standard deviation of P over what an
     uncertain block may be; null where it is certain. `drained` is the answer without water
     pressure, with the yield acceleration; null for a dry block.
+
+    With standard deviations of measured fields `ci_low` and `ci_high` include their errors, by
+    source in `uncertainty`, and are null if much of the measured range has no answer. `as_stated`
+    is the answer without them, null for a block that is unstable as stated. `sensitivity` has P at
+    usual errors of each measured field.
     """
+
+    ci_low: float | None
+    ci_high: float | None
+    uncertainty: list[SourceDocument]
+    sensitivity: list[SensitivityDocument]
 
     mode: str
     answers: list[ModelAnswer]
@@ -169,10 +197,15 @@ class PredictAnswer(_Answer):
 class PredictArrays(_Answer):
     """Probabilities of many blocks or motions; null where the input is rejected.
 
-    `drained` has `probability`, `ci_low` and `ci_high` without water pressure, null for dry blocks.
+    `drained` has `probability`, `ci_low` and `ci_high` without water pressure, null for dry blocks;
+    `as_stated` the same without errors of measurement, null without these; `sensitivity`, on
+    request, P at usual errors of each field, and `uncertainty` the fractions of its sources.
     """
 
     drained: dict[str, list[float | None]] | None
+    as_stated: dict[str, list[float | None]] | None
+    sensitivity: dict[str, list[float | None]] | None
+    uncertainty: dict[str, list[float | None]] | None
 
 
 @keys_of(TableAnswer, omitted=("blocks",))

@@ -23,7 +23,9 @@ from rbfrag.vocabulary.quantities import (
     COMPONENT,
     INPUTS,
     INTENSITY,
+    INVERSE,
     JOINT,
+    MEASURED,
     OTHER_WORDS,
     PLANES,
     QUANTITIES,
@@ -31,21 +33,24 @@ from rbfrag.vocabulary.quantities import (
     SHAKING,
     SHAPE,
     SPACE,
-    Limits,
     inputs_from,
     name_of,
     parameter_of,
 )
+from rbfrag.vocabulary.quantity import Limits
 
 T = TypeVar("T", bound=BaseModel)
 
 Text = Annotated[str, Field(min_length=1, max_length=200)]
 Positive = Annotated[float, Field(gt=0.0)]
 
+PerCent = Annotated[str, Field(pattern=r"^[0-9.,]+ ?%$", max_length=20)]
+"""A standard deviation as a fraction of its field: "5%"."""
+
 Column = StrictFloat | Annotated[list[StrictFloat | None], Field(min_length=1, fail_fast=True)]
 """A number that stands for every element, or a list of one an element, null where there is none."""
 
-COLUMNS = frozenset((*BLOCK, *SHAKING, "cohesion_pa", "density_kg_m3"))
+COLUMNS = frozenset((*BLOCK, *MEASURED, *SHAKING, "cohesion_pa", "density_kg_m3"))
 """Fields of which many blocks have one each."""
 
 _TEXTS = frozenset((*SPACE, *COMPONENT, "drainage"))
@@ -54,7 +59,7 @@ _TEXTS = frozenset((*SPACE, *COMPONENT, "drainage"))
 _NOT_SENT = frozenset({"block", "db", "gmm"})
 """Fields that no request can state."""
 
-_HOW = ("kind", *REQUEST)
+_HOW = ("kind", *REQUEST, *INVERSE)
 """Fields that say how a question is answered."""
 
 _DEFAULTS = {"level": LEVEL}
@@ -97,6 +102,8 @@ def asking(
         else:
             of = _limited(StrictFloat if many else float, QUANTITIES[name].range)
             of = of | None if default is None else of
+        if name in MEASURED and QUANTITIES[name].unit not in ("", "deg"):
+            of = of | PerCent
         shown = [examples[word]] if examples and word in examples else None
         field = Field(description=QUANTITIES[name].help(parameter_of), examples=shown)
         definitions[word] = (Annotated[of, field], default)
@@ -140,7 +147,7 @@ _SHAPE = (*SHAPE, *PLANES, *SPACE, *JOINT, "drainage", "back_fracture")
 _BEFORE_SLIP = tuple(name for name in _SHAPE if name != "phi_residual_deg")
 _AT_REST = (*_BEFORE_SLIP, "cohesion_pa", "density_kg_m3", *AT_REST)
 _BLOCK = (*BLOCK, *COMMON)
-_QUESTION = (*_BLOCK, *SHAKING, *REQUEST)
+_QUESTION = (*_BLOCK, *MEASURED, *SHAKING, *REQUEST, *INVERSE)
 
 
 @asking(*_AT_REST, examples={"s1": 1.0, "s2": 0.6, "gamma": 25.0, "beta": 20.0, "phi": 40.0})
@@ -158,9 +165,10 @@ class PredictQuery(Answered):
     """Parameters of `GET /v1/predict`."""
 
 
-@asking(*SHAKING, *REQUEST, "kind")
+@asking(*MEASURED, *SHAKING, *REQUEST, "kind")
 class TableQuery(Answered):
-    """Parameters of `/v1/table`: default kind of the rows, and shaking if no column has any."""
+    """Parameters of `/v1/table`: default kind of the rows, measurement errors of rows without, and
+    shaking if no column has any."""
 
     form: Literal["csv", "xlsx"] = "csv"
     """What the body is: csv (also cells pasted from a spreadsheet) or xlsx."""
@@ -168,11 +176,16 @@ class TableQuery(Answered):
     """Name of the sheet of a workbook. Default: the first."""
     ignore_columns: Text | None = None
     """Columns to ignore, separated by commas."""
+    sensitivity: bool = False
+    """Columns with P at usual errors of measurement."""
 
 
 @asking(*_QUESTION, many=True)
 class PredictRows(Answered):
     """Numbers, which apply to every element, and lists of equal length."""
+
+    sensitivity: bool = False
+    """With P at usual errors of measurement of each element."""
 
     model_config = ConfigDict(
         json_schema_extra={"examples": [{"p2": 3.0, "kr": [0.1, 0.2, 0.3], "pgv": [0.6, 0.6, 1.2]}]}

@@ -16,7 +16,9 @@ from rbfrag.exchange.tables.csv_file import NOTE, dialect_of
 from rbfrag.fragility.model_selection import models_in_memory
 from rbfrag.fragility.prediction_array import PredictionArray
 from rbfrag.question.document import answer_block
-from rbfrag.question.question import ask, with_drained_bound
+from rbfrag.question.drained_bound import with_drained_bound
+from rbfrag.question.keywords import reject_inverse
+from rbfrag.question.question import ask
 from rbfrag.results.diagnostic import diagnostics
 from rbfrag.service.documents import PredictAnswer, PredictArrays, TableAnswers
 from rbfrag.service.parameters import COLUMNS, PredictQuery, PredictRows, TableQuery
@@ -24,15 +26,15 @@ from rbfrag.service.problem import READ, SENT
 from rbfrag.service.reading import check_json, json_of, json_text, read_as, sent_as, sent_file
 from rbfrag.service.settings import ServiceSettings
 from rbfrag.service.work import WorkerPool, in_thread
-from rbfrag.vocabulary.quantities import SHAKING
+from rbfrag.vocabulary.quantities import MEASURED, SHAKING
 
-ELEMENTS_BESIDE = 20_000
-"""So many elements are answered beside other requests; more than these, by another process."""
+MOST_ELEMENTS_IN_PROCESS = 20_000
+"""Maximum number of elements answered in the process of the service; more go to another one."""
 
 TABLE = "block_id,height_m,width_m,dip_deg,phi_deg,pgv_m_s\nA,2,0.4,3,35,0.6\n"
 """A table of one block."""
 
-BYTES_BESIDE = 1 << 20
+MOST_BYTES_IN_PROCESS = 1 << 20
 """Longer bodies are parsed by another process, whatever they hold."""
 
 
@@ -70,10 +72,15 @@ def answer_many(body: bytes, row_limit: int, db: str | None) -> bytes:
     fields, how = rows.question()
     # in which null is NaN
     arrays = {
-        name: np.array(value, dtype=np.float64, ndmin=1) if name in COLUMNS else value
+        name: np.array(value, dtype=np.float64, ndmin=1)
+        if name in COLUMNS and not isinstance(value, str)
+        else value
         for name, value in fields.items()
     }
-    answers = with_drained_bound(lambda inputs: ask(inputs, **how, db=db), arrays)
+    reject_inverse(how)
+    answers = with_drained_bound(
+        lambda inputs: ask(inputs, **how, db=db, sensitivity=rows.sensitivity), arrays
+    )
     assert isinstance(answers, PredictionArray)
     return json_text(answers.with_rejected_elements().as_dict())
 
@@ -104,10 +111,10 @@ def answer_table(body: bytes, query: TableQuery, row_limit: int, db: str | None)
         try:
             with opened_table(source, SHAKING, sheet=query.sheet, ignore_columns=ignored) as table:
                 if not {*SHAKING}.isdisjoint(table.header.columns):
-                    inputs = {}
+                    inputs = {name: v for name, v in inputs.items() if name in MEASURED}
             answer = predict_table(
                 source, target, inputs=inputs, kind=kind, sheet=query.sheet, ignore_columns=ignored,
-                excel_text=True, db=db, **how,
+                excel_text=True, sensitivity=query.sensitivity, db=db, **how,
             )  # fmt: skip
         except InputError as error:
             raise InputError(str(error).replace(f"{source}", "the table")) from None
@@ -184,6 +191,6 @@ def add_routes(routes: APIRouter, settings: ServiceSettings, pool: WorkerPool) -
         body = await request.body()
         check_json(body, settings.row_limit)
         arguments = body, settings.row_limit, settings.db
-        if len(body) > BYTES_BESIDE or body.count(b",") > ELEMENTS_BESIDE:
+        if len(body) > MOST_BYTES_IN_PROCESS or body.count(b",") > MOST_ELEMENTS_IN_PROCESS:
             return await pool.run(request, answer_many, *arguments)
         return await in_thread(settings.time_limit, answer_many, *arguments)

@@ -20,7 +20,7 @@ from rbfrag.db.location import locate, reference_file
 from rbfrag.errors import DatabaseError, InputError, RbfragError, UnknownModelError
 from rbfrag.service.documents import Problem
 from rbfrag.service.settings import ServiceSettings
-from rbfrag.vocabulary.quantities import parameter_of
+from rbfrag.vocabulary.quantities import MEASURED, ONLY_PREDICT, name_of, parameter_of
 
 MEDIA_TYPE = "application/problem+json"
 
@@ -188,6 +188,8 @@ def rejection(fields: Mapping[str, FieldInfo], errors: Sequence[Mapping[str, Any
     )
     name = str(first["loc"][0])
     if worst["type"] == "extra_forbidden":
+        if name_of(name) in MEASURED:
+            return InputError(ONLY_PREDICT.format(name))
         names = ", ".join(fields)
         return InputError(f"unknown parameter {name[:60]!r}; the parameters are {names}")
     indices = "".join(f"[{index}]" for index in worst["loc"][1:] if isinstance(index, int))

@@ -1,15 +1,14 @@
-"""HTTP connections with limits on headers and idle time; requests in progress are completed."""
+"""HTTP connections of uvicorn that are closed only after the response has been read.
+
+How long headers may take and how many connections may be open is the business of the web server
+before a service that other computers reach (docs/howto/service.md).
+"""
 
 from __future__ import annotations
 
-import asyncio
-from itertools import islice
-from typing import Any, ClassVar
+from typing import Any
 
 from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol
-
-HEADERS_S = 15.0
-"""Longest time [s] that the headers of a request may take to come."""
 
 HEADERS_BYTES = 64 * 1024
 """Longest headers of a request, its URL included."""
@@ -23,36 +22,19 @@ LINGER_S = 5.0
 LINGER_BYTES = 1 << 26
 """How much it may send; a 64th of it where it does not say how much it will."""
 
-CONNECTIONS = 500
-"""With more open connections than these, those that have been idle longest are closed."""
-
-_END = b"connection: close\r\ncontent-length: 0\r\n\r\n"
-_TOO_LARGE = b"HTTP/1.1 431 Request Header Fields Too Large\r\n" + _END
-_TOO_SLOW = b"HTTP/1.1 408 Request Timeout\r\n" + _END
+_TOO_LARGE = (
+    b"HTTP/1.1 431 Request Header Fields Too Large\r\n"
+    b"connection: close\r\ncontent-length: 0\r\n\r\n"
+)
 
 
-class BoundedProtocol(HttpToolsProtocol):
-    """A connection with limits on its headers, closed only after the response."""
+class LingeringProtocol(HttpToolsProtocol):
+    """A connection with headers of bounded length, closed only after the response."""
 
-    _open: ClassVar[dict[BoundedProtocol, None]] = {}
-    """The connections of this process, the one that was last used last."""
-    _late: asyncio.TimerHandle | None = None
-    _read = 0
+    _header_bytes: int | None = 0
+    """Bytes of the headers that are being received; None while a body or an answer is under way."""
     _ending = False
     _unread: int | None = None
-
-    def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
-        """Start the timeout of the first headers."""
-        super().connection_made(transport)
-        self._close_longest_idle()
-        self._used()
-        self._wait_for_headers()
-
-    def connection_lost(self, exc: Exception | None) -> None:
-        """Stop all timeouts."""
-        self._stop_waiting()
-        self._open.pop(self, None)
-        super().connection_lost(exc)
 
     def data_received(self, data: bytes) -> None:
         """Process data, unless the headers are too long."""
@@ -62,21 +44,20 @@ class BoundedProtocol(HttpToolsProtocol):
                 self.transport.close()
             return
         super().data_received(data)
-        if self._late is not None:
-            self._read += len(data)
-            if self._read > HEADERS_BYTES:
-                self._reject(_TOO_LARGE)
+        if self._header_bytes is not None:
+            self._header_bytes += len(data)
+            if self._header_bytes > HEADERS_BYTES and not self.transport.is_closing():
+                self.transport.write(_TOO_LARGE)
+                self.transport.close()
 
     def on_message_begin(self) -> None:
-        """Start the timeout of the headers of a request."""
+        """Count the headers of a request from here."""
         super().on_message_begin()
-        if self._late is None:
-            self._wait_for_headers()
+        self._header_bytes = 0
 
     def on_headers_complete(self) -> None:
         """Start the response."""
-        self._stop_waiting()
-        self._used()
+        self._header_bytes = None
         super().on_headers_complete()
         self.cycle.transport = _Lingering(self, self.cycle)  # type: ignore[assignment]
         if self._ending:
@@ -97,52 +78,24 @@ class BoundedProtocol(HttpToolsProtocol):
     def shutdown(self) -> None:
         """Close after a pending response; the client may just have sent a request."""
         self._ending = True
-        if self._idle():
+        if self._is_idle():
             self._unset_keepalive_if_required()
-            self.loop.call_later(LAST_WORDS_S, self._end_if_idle)
+            self.loop.call_later(LAST_WORDS_S, self._close_if_idle)
         else:
             super().shutdown()
 
-    def _used(self) -> None:
-        self._open.pop(self, None)
-        self._open[self] = None
-
-    def _close_longest_idle(self) -> None:
-        """Close the longest idle connections when there are too many."""
-        too_many = 1 + len(self._open) - CONNECTIONS
-        if too_many > 0:
-            idle = (connection for connection in self._open if connection._idle())
-            for connection in list(islice(idle, too_many)):
-                connection._reject(_TOO_SLOW)
-                self._open.pop(connection, None)
-
-    def _idle(self) -> bool:
+    def _is_idle(self) -> bool:
         return self.cycle is None or self.cycle.response_complete
 
-    def _end_if_idle(self) -> None:
-        if self._idle() and not self.transport.is_closing():
-            self.transport.close()
-
-    def _wait_for_headers(self) -> None:
-        self._read = 0
-        self._late = self.loop.call_later(HEADERS_S, self._reject, _TOO_SLOW)
-
-    def _stop_waiting(self) -> None:
-        if self._late is not None:
-            self._late.cancel()
-            self._late = None
-
-    def _reject(self, answer: bytes) -> Any:
-        self._stop_waiting()
-        if not self.transport.is_closing():
-            self.transport.write(answer)
+    def _close_if_idle(self) -> None:
+        if self._is_idle() and not self.transport.is_closing():
             self.transport.close()
 
 
 class _Lingering:
     """Transport of a response that stays open while part of a request body is unread."""
 
-    def __init__(self, protocol: BoundedProtocol, cycle: Any) -> None:
+    def __init__(self, protocol: LingeringProtocol, cycle: Any) -> None:
         self._protocol = protocol
         self._cycle = cycle
 

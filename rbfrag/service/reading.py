@@ -18,13 +18,7 @@ from rbfrag.errors import InputError
 from rbfrag.files import unique_keys
 from rbfrag.question.table import field_of
 from rbfrag.results.diagnostic import with_diagnostics
-from rbfrag.service.problem import (
-    BUSY,
-    GONE,
-    MalformedError,
-    RequestRefusedError,
-    rejection,
-)
+from rbfrag.service.problem import BUSY, GONE, MalformedError, RequestRefusedError, rejection
 from rbfrag.service.settings import ServiceSettings
 from rbfrag.solver.kinds import FREE_STANDING
 from rbfrag.vocabulary.quantities import parameter_of
@@ -240,7 +234,7 @@ def read_as(model: type[T], values: Any) -> T:
 class QueryRoute(APIRoute):
     """Route with one query model, unique parameters, and a limited body.
 
-    FastAPI inspects every field of such a model anew for each request: with the names of
+    FastAPI inspects every field of such a model again for each request: with the names of
     `/v1/predict` that takes longer than all the rest of the answer (docs/evidence/performance.md).
     """
 

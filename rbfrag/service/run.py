@@ -37,8 +37,8 @@ def serve() -> None:
     """Answer requests until the process is stopped, with settings from the environment."""
     import uvicorn
 
-    from rbfrag.service.protocol import BoundedProtocol
-    from rbfrag.service.request_records import CONFIGURATION, SHARED_FOLDER
+    from rbfrag.service.guard import CONFIGURATION, SHARED_FOLDER
+    from rbfrag.service.protocol import LingeringProtocol
 
     chosen = _settings()
     with TemporaryDirectory(prefix="rbfrag-metrics-") as folder:
@@ -48,7 +48,7 @@ def serve() -> None:
             f"{__name__}:app",
             factory=True,
             interface="asgi3",
-            http=BoundedProtocol,
+            http=LingeringProtocol,
             ws="none",
             host=chosen.host,
             port=chosen.port,
@@ -96,7 +96,7 @@ def listener(host: str, port: int) -> socket.socket:
 def app() -> FastAPI:
     """Return the web application with settings from the environment."""
     from rbfrag.service.app import make_app
-    from rbfrag.service.request_records import log_as_json
+    from rbfrag.service.guard import log_as_json
 
     log_as_json()
     return make_app(_settings())

@@ -8,7 +8,7 @@ from __future__ import annotations
 import asyncio
 import multiprocessing
 import signal
-from collections.abc import Callable
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, cast
 
@@ -17,7 +17,7 @@ from pebble import ProcessExpired, ProcessPool
 
 from rbfrag.db.sqlite_file import LONGEST_WAIT_S
 from rbfrag.errors import InputError, MotionFileError
-from rbfrag.service.block import require
+from rbfrag.service.guard import log_as_json
 from rbfrag.service.parameters import (
     CriticalQuery,
     HazardQuery,
@@ -33,10 +33,10 @@ from rbfrag.service.problem import (
     SeveralTracesError,
 )
 from rbfrag.service.reading import json_of, json_text
-from rbfrag.service.request_records import log_as_json
 
 if TYPE_CHECKING:
     from rbfrag.hazards.curve import CurveKeywords
+    from rbfrag.hazards.hazard_answer import HazardAnswer
     from rbfrag.motions.ground_motion import GroundMotion
     from rbfrag.motions.polarity import Polarity
     from rbfrag.question.fields import AnsweringFields
@@ -133,7 +133,8 @@ def hazard(body: bytes, query: HazardQuery, db: str | None) -> bytes:
 
     from rbfrag.hazards.curve_file import hazard_curves_in, suited_curves
     from rbfrag.hazards.hazard_rates import hazard_at_sites, with_drained_rates
-    from rbfrag.hazards.im_uncertainty import velocity_conversion
+    from rbfrag.hazards.shaking import velocity_conversion
+    from rbfrag.question.drained_bound import is_wet, without_water
 
     try:
         curves = hazard_curves_in(_text(body), FILE, imt=query.imt, site=query.site)
@@ -152,13 +153,28 @@ def hazard(body: bytes, query: HazardQuery, db: str | None) -> bytes:
     sites = np.arange(len(curves))
     site_curves = [[curve] for curve in curves]
     answering = cast("AnsweringFields", {**how, "db": db})
-    rates = with_drained_rates(
-        lambda blocks: hazard_at_sites(
+
+    def answer(blocks: Mapping[str, Any]) -> HazardAnswer:
+        return hazard_at_sites(
             site_curves, sites, blocks, cast("CurveKeywords", meaning), answering, years=query.years
-        ),
-        block_inputs,
-    )
+        )
+
+    rates = answer(block_inputs)
+    if is_wet(inputs):
+        rates = with_drained_rates(rates, lambda: answer(without_water(block_inputs)), True)
     return json_text(rates.as_dict())
+
+
+def require(numbers: Collection[str], *names: str) -> None:
+    """Reject a block with a missing number."""
+    from rbfrag.question.shape_validation import OF_A_SHAPE, WAYS
+
+    for name in names:
+        if name not in numbers:
+            raise InputError(
+                f"{name} is missing: a block is given by {' and '.join(names)}, or by {WAYS}",
+                fields=OF_A_SHAPE,
+            )
 
 
 def _motion(body: bytes, query: Reading) -> GroundMotion:
@@ -223,7 +239,12 @@ class WorkerPool:
         """Return what a function of a module answers; the work ends when the client goes."""
         future = self.open().schedule(function, args=arguments)
         answer = asyncio.wrap_future(future)
-        disconnected = asyncio.ensure_future(_disconnected(request))
+
+        async def wait_for_disconnect() -> None:
+            while (await request.receive())["type"] != "http.disconnect":
+                pass
+
+        disconnected = asyncio.ensure_future(wait_for_disconnect())
         either: list[asyncio.Future[Any]] = [answer, disconnected]
         try:
             await asyncio.wait(either, timeout=self._limit_s, return_when=asyncio.FIRST_COMPLETED)
@@ -254,20 +275,15 @@ class WorkerPool:
 
 
 async def in_thread(limit_s: float, function: Callable[..., Any], *arguments: Any) -> Any:
-    """Return what a function answers that may wait for a database, beside other requests.
+    """Return the result of a function that may wait for a database, while others are answered.
 
-    Whoever asks is told after the limit of time; the database is waited for no longer either.
+    The client gets an answer after the time limit; the database is waited for no longer either.
     """
     LONGEST_WAIT_S.set(limit_s)  # for this request alone, and for its thread
     try:
         return await asyncio.wait_for(asyncio.to_thread(function, *arguments), limit_s)
     except TimeoutError:
         raise RequestRefusedError(*BUSY) from None
-
-
-async def _disconnected(request: Request) -> None:
-    while (await request.receive())["type"] != "http.disconnect":
-        pass
 
 
 def _begin() -> None:

@@ -126,8 +126,8 @@ def kind_of(kind: str | None, options: Mapping[str, Any]) -> Kind:
     for name in ("beta_deg", "phi_deg"):
         if name not in options:
             raise InputError(f"{name} is missing: the mode of a block depends on dip and friction")
-    judged = judged_at_rest(options)
-    return model_of_mode(judged.mode)
+    assessment = judged_at_rest(options)
+    return model_of_mode(assessment.mode)
 
 
 def judged_at_rest(options: Mapping[str, Any]) -> Stability:
@@ -136,7 +136,7 @@ def judged_at_rest(options: Mapping[str, Any]) -> Stability:
     Without a friction angle it is one that topples.
     """
     block = options["block"]
-    judged = stability(
+    assessment = stability(
         block,
         beta_deg=options["beta_deg"],
         phi_deg=options.get("phi_deg", rough_deg(block)),
@@ -145,5 +145,5 @@ def judged_at_rest(options: Mapping[str, Any]) -> Stability:
         drainage=options.get("drainage"),
         density_kg_m3=options.get("density_kg_m3"),
     )
-    require_stable(judged)
-    return judged
+    require_stable(assessment)
+    return assessment

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
 from typing import NamedTuple
 
@@ -58,7 +58,8 @@ class Excitation:
         w: effective gravity 1 + k_v [-], shape (n,).
         pga_g: PGA of the horizontal motion, over both signs [g].
         warnings: sentences about how the two components were brought together.
-        span_tables: tables of `rbfrag.solver.integrator.spans` by length, kept for the next search.
+        span_tables: tables of spans (`rbfrag.solver.integrator.block_excitation`) by length, kept
+            for the next search.
     """
 
     time_s: FloatArray
@@ -124,6 +125,16 @@ class Excitation:
         )  # fmt: skip
 
     @cached_property
+    def duration_s(self) -> float:
+        """Time from the first to the last node [s]."""
+        return float(self.time_s[-1] - self.time_s[0])
+
+    @cached_property
+    def samples_total(self) -> int:
+        """Number of sample intervals, jumps left out."""
+        return int(np.count_nonzero(self.interval_s))
+
+    @cached_property
     def min_q(self) -> float:
         """Minimum q over the record."""
         return float(self.q.min())
@@ -141,14 +152,8 @@ class Excitation:
         """
         if factor == 1.0:
             return self
-        return Excitation(
-            time_s=self.time_s,
-            interval_s=self.interval_s,
-            k_h=factor * self.k_h,
-            w=1.0 + factor * (self.w - 1.0),
-            pga_g=factor * self.pga_g,
-            warnings=self.warnings,
-        )
+        k_h, w, pga_g = factor * self.k_h, 1.0 + factor * (self.w - 1.0), factor * self.pga_g
+        return replace(self, k_h=k_h, w=w, pga_g=pga_g)
 
     def with_rest_after(self, duration_s: float, intervals: int) -> Excitation:
         """Return the same shaking followed by a stretch of rest, to which the last sample jumps.
@@ -192,7 +197,16 @@ def excitation(
     if vertical is None:
         w = np.ones_like(k_h)
     else:
-        _reject_different_sampling(motion, vertical)
+        if motion.node_time_s is None and vertical.node_time_s is None:
+            if motion.dt_s != vertical.dt_s:
+                raise InputError(
+                    f"the vertical component has dt = {vertical.dt_s:g} s, the horizontal "
+                    f"{motion.dt_s:g} s: bring both to one sampling interval first"
+                )
+        elif not np.array_equal(motion.time_s, vertical.time_s):
+            raise InputError(
+                "the vertical component must have the same node times as the horizontal"
+            )
         k_v = vertical.acceleration_g
         if k_v.size != k_h.size:
             longer = motion if k_h.size > k_v.size else vertical
@@ -223,13 +237,13 @@ def excitation(
     )
 
 
-@lru_cache(maxsize=8)
+@lru_cache(maxsize=32)
 def kept_excitation(
     motion: GroundMotion, vertical: GroundMotion | None, polarity: Polarity
 ) -> Excitation:
     """Return :func:`excitation`, the same object for the last few motions.
 
-    What a search works out about a record serves the next size of block too.
+    What a search or a run works out about a record serves the next block too.
     """
     return excitation(motion, vertical, polarity)
 
@@ -237,18 +251,6 @@ def kept_excitation(
 def _twice(values: FloatArray, n: int) -> FloatArray:
     """Repeat the value of sample n - 1."""
     return np.concatenate([values[:n], values[n - 1 :]])
-
-
-def _reject_different_sampling(motion: GroundMotion, vertical: GroundMotion) -> None:
-    if motion.node_time_s is None and vertical.node_time_s is None:
-        if motion.dt_s != vertical.dt_s:
-            raise InputError(
-                f"the vertical component has dt = {vertical.dt_s:g} s, the horizontal "
-                f"{motion.dt_s:g} s: bring both to one sampling interval first"
-            )
-        return
-    if not np.array_equal(motion.time_s, vertical.time_s):
-        raise InputError("the vertical component must have the same node times as the horizontal")
 
 
 def motion_remarks(

@@ -18,7 +18,6 @@ import numpy as np
 
 from rbfrag.errors import InputError
 from rbfrag.solver.block.geometry import Block
-from rbfrag.solver.contacts import corner_at, corners_of
 from rbfrag.solver.excitation import Excitation
 from rbfrag.solver.integrator.free_body import (
     AT_REST,
@@ -35,15 +34,86 @@ from rbfrag.solver.integrator.free_body import (
     Motion,
     run_free,
 )
-from rbfrag.solver.integrator.impulses import work_of
+from rbfrag.solver.integrator.impulses import Corners, work_of
 from rbfrag.solver.integrator.one_freedom.equation import Pose
 from rbfrag.solver.kind import SupportedBlock
 from rbfrag.solver.quantity import finite_or_none
 from rbfrag.solver.results import FloatArray, ModeChange, Outcome
 from rbfrag.solver.stability.modes import ModeName
 
+TOUCHES = 1e-6
+"""Distance from a plane, over the size of the block, at which a corner touches it: steps leave
+a few times 1e-9 of it."""
+
+
+def corner_at(
+    centroid: tuple[float, float], turned_rad: float, arm: tuple[float, float]
+) -> tuple[float, float]:
+    """Return the position [m] of a corner from its arm about the centroid before rotation."""
+    c, s = math.cos(turned_rad), math.sin(turned_rad)
+    return centroid[0] + arm[0] * c - arm[1] * s, centroid[1] + arm[0] * s + arm[1] * c
+
+
+def corners_of(supported_block: SupportedBlock, block: Block) -> Corners:
+    """Return the pairs of corner and plane: those with the base first."""
+    arms = np.array(block.outline)
+    gamma = math.radians(block.gamma_deg)
+    # of base and back plane, into the block; each plane touches its nearest corner at rest
+    normals = [(0.0, 1.0), (math.sin(gamma), math.cos(gamma))]
+    from_heel = arms - np.array(block.heel)
+    planes = 2 if supported_block.back_fracture else 1
+    offs = [float((from_heel @ np.array(normal)).min()) for normal in normals]
+    n = len(arms)
+    friction = (math.tan(supported_block.phi_rad), math.tan(supported_block.phi_back_rad))
+    named = {block.heel: HEEL, block.toe: TOE}
+    bits = [named.get(arm, ON_BASE) for arm in block.outline] + [ON_BACK] * (planes - 1) * n
+
+    def both(values: list[float] | tuple[float, ...]) -> FloatArray:
+        return np.repeat(np.array(values[:planes], dtype=np.float64), n)
+
+    return Corners(
+        np.tile(arms[:, 0], planes),
+        np.tile(arms[:, 1], planes),
+        both([x for x, _ in normals]),
+        both([y for _, y in normals]),
+        both(offs),
+        both(friction),
+        np.array(bits, dtype=np.float64),
+    )
+
+
+def gap_m(block: Block, pose: Pose) -> float:
+    """Return the gap between the heel and its back plane, along the base [m]."""
+    # normal distance of the heel from its plane, less that which a missing corner leaves at rest
+    gamma = math.radians(block.gamma_deg)
+    normal = (math.sin(gamma), math.cos(gamma))
+    low = [a - b for a, b in zip(block.lowest_on_back, block.heel, strict=True)]
+    off = low[0] * normal[0] + low[1] * normal[1]
+    x, y = corner_at(pose.centroid_m, pose.turned_rad, block.heel)
+    gap = (x * normal[0] + y * normal[1] - off) / normal[0]
+    return gap if gap > 1e-12 * block.r3_m else 0.0
+
+
+def touching(supported_block: SupportedBlock, pose: Pose) -> tuple[str, ...]:
+    """Return the corners of a block that touch each plane."""
+    block = supported_block.block
+    assert block is not None
+    corners = corners_of(supported_block, block)
+    n = len(block.outline)
+    names = {block.heel: "heel", block.toe: "toe", block.back: "upper back corner"}
+    contacts = []
+    for i in range(corners.arm_x.size):
+        arm = block.outline[i % n]
+        x, y = corner_at(pose.centroid_m, pose.turned_rad, arm)
+        away = x * corners.normal_x[i] + y * corners.normal_y[i] - corners.off_m[i]
+        if away <= TOUCHES * block.r3_m:
+            plane = "base" if i < n else "back plane"
+            contacts.append(f"{names.get(arm, 'another corner')} on the {plane}")
+    return tuple(contacts)
+
+
 STEP_S = 2e-4
-"""Step [s]; a run of twice the step beside it tells the error of the steps."""
+"""Step [s]; a second run of twice the step gives the error of the steps."""
 
 RIGID = (0.0, 1.0)
 """Restitution and friction of impacts, as `rbfrag.solver.integrator.free_body.Frame` has them: they
@@ -56,10 +126,10 @@ SHORTEST_S = 0.02
 """Time for which a block must do something for it to count as a change of what it does [s]."""
 
 ON_ITS_BACK_EDGE = (
-    "at {:.3f} s the back edge of the block lies on the base plane: it slides on from there, past "
-    "recovery"
+    "the back edge of the block lies on the base plane: it slides on from there, past recovery"
 )
-ON_ITS_FACE = "at {:.3f} s the block lies on its front face"
+ON_ITS_FACE = "the block lies on its front face"
+NEVER_ENDS = "a minute after the record the block neither stops nor falls"
 
 
 @dataclass(frozen=True)
@@ -161,7 +231,7 @@ class FreeMotion:
         if any(other.fails != self.coarse.fails for other in self._alternatives):
             return None
         # compared with the coarse run: what laws differ by needs no finer steps
-        of_laws = map(max, *(self.coarse.beside(other) for other in self._alternatives))
+        of_laws = map(max, *(self.coarse.differences_from(other) for other in self._alternatives))
         return FreeError(*(a + b for a, b in zip(self.step_error, of_laws, strict=True)))
 
     @cached_property
@@ -219,7 +289,7 @@ class _Path(NamedTuple):
     def fails(self) -> bool:
         return self.run.stop in (BACKWARD, FORWARD)
 
-    def beside(self, other: _Path) -> FreeError:
+    def differences_from(self, other: _Path) -> FreeError:
         """Return the differences between two runs."""
         rotations = zip(self.rotations, other.rotations, strict=True)
         slips = zip(self.slips, other.slips, strict=True)
@@ -268,9 +338,15 @@ def free_motion(
         laws = zip(OTHER_LAWS, starts[1:], strict=True)
         return tuple(path(2.0 * STEP_S, law, start) for law, start in laws)
 
-    outcome, sentence = _ending(fine.run)
+    after_s = f"at {fine.run.time_s:.3f} s"
+    outcome, sentence = {
+        AT_REST: (Outcome.STABLE, ""),
+        BACKWARD: (Outcome.TOPPLED, f"{after_s} {ON_ITS_BACK_EDGE}"),
+        FORWARD: (Outcome.TOPPLED, f"{after_s} {ON_ITS_FACE}"),
+        JUMPED: (Outcome.JUMP, f"{after_s}: {Outcome.JUMP.advice}"),
+    }.get(fine.run.stop, (Outcome.UNDETERMINED, NEVER_ENDS))
     least_rad, most_rad, _ = fine.rotations
-    step_error = fine.beside(coarse)
+    step_error = fine.differences_from(coarse)
     # whether it fails hangs on the step: closer to critical than the error
     if fine.fails != coarse.fails or any(map(math.isnan, step_error)):
         outcome, sentence = Outcome.UNDETERMINED, Outcome.UNDETERMINED.advice
@@ -346,18 +422,6 @@ def _slips(block: Block, rows: FloatArray, contact: tuple[float, float]) -> Floa
     start = contact[0] - block.heel[0]
     slips: FloatArray = x + contact[0] * np.cos(turned) - contact[1] * np.sin(turned) - start
     return slips
-
-
-def _ending(run: FreeRun) -> tuple[Outcome, str]:
-    if run.stop == AT_REST:
-        return Outcome.STABLE, ""
-    if run.stop == BACKWARD:
-        return Outcome.TOPPLED, ON_ITS_BACK_EDGE.format(run.time_s)
-    if run.stop == FORWARD:
-        return Outcome.TOPPLED, ON_ITS_FACE.format(run.time_s)
-    if run.stop == JUMPED:
-        return Outcome.JUMP, f"at {run.time_s:.3f} s: {Outcome.JUMP.advice}"
-    return Outcome.UNDETERMINED, "a minute after the record the block neither stops nor falls"
 
 
 SLIDES = "slides on its base"

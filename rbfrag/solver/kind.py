@@ -16,7 +16,7 @@ from rbfrag.errors import InputError
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.critical_result import CriticalResult
-from rbfrag.solver.excitation import Excitation, excitation, motion_remarks
+from rbfrag.solver.excitation import Excitation, kept_excitation, motion_remarks
 from rbfrag.solver.kinds import KindSpec, facts_of
 from rbfrag.solver.results import BlockState, Outcome, Polarity, Response
 from rbfrag.solver.stability.modes import DRY, ModeName, Push
@@ -106,7 +106,7 @@ class Shaking:
     @cached_property
     def excitation(self) -> Excitation:
         """Both components at common nodes, polarity applied."""
-        return excitation(self.motion, self.vertical, self.polarity)
+        return kept_excitation(self.motion, self.vertical, self.polarity)
 
     @property
     def warnings(self) -> tuple[str, ...]:

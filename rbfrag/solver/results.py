@@ -307,6 +307,14 @@ class Response(Result):
     parts: tuple[Part, ...] = ()
     drained: DrainedYield | None = None
 
+    def with_values(self, **values: Any) -> Response:
+        """Return the answer with other values, as :func:`dataclasses.replace`, which takes longer
+        than a run.
+        """
+        answer = object.__new__(Response)
+        vars(answer).update(vars(self) | values)
+        return answer
+
     @property
     def how(self) -> str:
         """Source of the answer: ``followed in time``, or ``by mechanics`` without motion."""

@@ -1,20 +1,27 @@
-"""One free-standing block under one excitation: the public form of the rocking kernel."""
+"""Free-standing blocks under one excitation, one or many: the public form of the rocking kernel."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
-from rbfrag.solver.excitation import Excitation
-from rbfrag.solver.integrator.free_rocking import TOPPLED
-from rbfrag.solver.integrator.rocking_kernel import IMPACT, RockingRules, RockingRun, run_rocking
+from rbfrag.solver.excitation import Excitation, Nodes
+from rbfrag.solver.history import node_history, with_free_motion
+from rbfrag.solver.integrator.compiled import kernel
+from rbfrag.solver.integrator.rocking_kernel import (
+    IMPACT,
+    STABLE,
+    TOPPLED,
+    RockingRules,
+    RockingRun,
+    run_rocking,
+)
 from rbfrag.solver.integrator.state import Corner
 from rbfrag.solver.integrator.taylor import ORDER, PH_MAX
-from rbfrag.solver.node_history import node_history, with_free_motion
-from rbfrag.solver.results import FloatArray, ResponseHistory
+from rbfrag.solver.results import FloatArray, IntArray, ResponseHistory
 
 REST_SPEED = 1e-6
 """Speed after an impact at which the block rests, over the least p times the least critical angle.
@@ -78,22 +85,8 @@ def simulate(
     )
 
 
-@dataclass(frozen=True, eq=False)
-class RockingHistory:
-    """Time history of the motion, and its impacts.
-
-    Args:
-        motion: rotation (forward positive) and its rate at nodes and events.
-        impact_s: times of the impacts [s], shape (n,), those of the free motion that is shown
-            after the record included.
-    """
-
-    motion: ResponseHistory
-    impact_s: FloatArray
-
-
-def rocking_history(excited: Excitation, block: FreeBlock, impacts: int) -> RockingHistory:
-    """Run over the record and a stretch of rest after it, keeping every node and event.
+def rocking_history(excited: Excitation, block: FreeBlock, impacts: int) -> ResponseHistory:
+    """Run over the record and a stretch of rest after it, keeping every node, event and impact.
 
     Args:
         impacts: number of impacts within the record, which decides the size of the arrays.
@@ -105,7 +98,7 @@ def rocking_history(excited: Excitation, block: FreeBlock, impacts: int) -> Rock
     run = simulate(longer, block, rows=rows)
     columns = rows[:, : run.history_length]
     motion = node_history(excited, longer, columns, toppled=run.outcome == TOPPLED)
-    return RockingHistory(motion, columns[0, columns[3] == IMPACT])
+    return replace(motion, impact_s=columns[0, columns[3] == IMPACT])
 
 
 @dataclass(frozen=True)
@@ -176,3 +169,79 @@ def corner_force(
 
 def _first(time_s: FloatArray, where: np.ndarray) -> float | None:
     return float(time_s[np.argmax(where)]) if where.any() else None
+
+
+@kernel
+def run_free_blocks(
+    excitations: tuple[Nodes, Nodes, Nodes],
+    tails: tuple[FloatArray, FloatArray, FloatArray],
+    corners: FloatArray,
+    slowest: FloatArray,
+    most_impacts: int,
+    outcome: IntArray,
+    theta_n: FloatArray,
+    sensitive: IntArray,
+) -> None:
+    """Run one block after another, each under the motion and under two almost identical ones.
+
+    Args:
+        excitations: the motion, and the same times a little more and a little less.
+        tails: greatest k_h/(1 + k_v) from each node on, of each.
+        corners: numbers of both corners of each block, toe before heel, shape (n, 2, 6).
+        slowest: speed after an impact below which each block rests [rad/s], shape (n,).
+        most_impacts: impacts beyond which a run is given up.
+        outcome: filled with the codes, shape (n,).
+        theta_n: filled with the peaks over their critical angles, shape (n,).
+        sensitive: filled with 1 where the outcomes differ, shape (n,).
+    """
+    # made once for all blocks: the coefficients of a step, and no history
+    u = np.empty(9)
+    no_rows = np.empty((4, 0))
+    for j in range(outcome.size):
+        c = corners[j]
+        toe = Corner(c[0, 0], c[0, 1], c[0, 2], c[0, 3], c[0, 4], c[0, 5])
+        heel = Corner(c[1, 0], c[1, 1], c[1, 2], c[1, 3], c[1, 4], c[1, 5])
+        rules = RockingRules(ORDER, PH_MAX, slowest[j], most_impacts)
+        run = run_rocking(excitations[0], tails[0], toe, heel, rules, no_rows, u)
+        outcome[j] = run.outcome
+        theta_n[j] = np.nan
+        if run.outcome == STABLE:
+            theta_n[j] = max(run.forward.x / toe.theta_c, run.backward.x / heel.theta_c)
+        sensitive[j] = 0
+        # one other outcome is enough: most sensitive blocks cost two runs, not three
+        for i in (1, 2):
+            if sensitive[j] == 0:
+                other = run_rocking(excitations[i], tails[i], toe, heel, rules, no_rows, u)
+                sensitive[j] = 1 if other.outcome != run.outcome else 0
+
+
+def simulate_free(
+    excited: Excitation,
+    corners: FloatArray,
+    slowest: FloatArray,
+    *,
+    most_impacts: int,
+    change: float,
+) -> tuple[IntArray, FloatArray, IntArray]:
+    """Run many free-standing blocks under one excitation.
+
+    Args:
+        corners: numbers of both corners of each block, toe before heel, shape (n, 2, 6).
+        slowest: speed after an impact below which each block rests [rad/s], shape (n,).
+        most_impacts: impacts beyond which a run is given up.
+        change: relative change of the motion that sensitive outcomes are told by.
+
+    Returns:
+        Codes of the outcomes (`rbfrag.solver.integrator.rocking_kernel`); the larger ratio of a
+        peak rotation to its critical angle, NaN unless the block stays; 1 where the outcome changes
+        with the motion; each of shape (n,).
+    """
+    # Rocking about two corners is chaotic for slender blocks (docs/theory/rocking.md): an outcome
+    # that changes under a motion scaled by 1 + change or 1 - change is reported as sensitive
+    more, less = excited.scaled(1.0 + change), excited.scaled(1.0 - change)
+    excitations = (excited.nodes, more.nodes, less.nodes)
+    tails = (excited.tail_max_q, more.tail_max_q, less.tail_max_q)
+    n = slowest.size
+    outcome, theta_n, sensitive = np.empty(n, np.int64), np.empty(n), np.empty(n, np.int64)
+    run_free_blocks(excitations, tails, corners, slowest, most_impacts, outcome, theta_n, sensitive)
+    return outcome, theta_n, sensitive

@@ -1,14 +1,18 @@
-"""Simulation of a block to its end: by its mechanism, then step by step after that ends."""
+"""Blocks with a mechanism of one degree of freedom: their simulation to the end, by the mechanism
+and step by step after that ends, and the models that such a mechanism defines.
+"""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
+from rbfrag.errors import InputError
 from rbfrag.results.diagnostic import Diagnostic
-from rbfrag.solver.contacts import gap_m, touching
+from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.excitation import Excitation
 from rbfrag.solver.free_motion import (
     MODES_OF,
@@ -18,11 +22,13 @@ from rbfrag.solver.free_motion import (
     Kinematics,
     Release,
     free_motion,
+    gap_m,
     released,
+    touching,
 )
 from rbfrag.solver.integrator.one_freedom.equation import Mechanism, Pose
-from rbfrag.solver.integrator.one_freedom.follow import MechanismRun, MotionHistory, follow
-from rbfrag.solver.kind import RunEnd, Shaking, SupportedBlock
+from rbfrag.solver.integrator.one_freedom.follow import MechanismRun, follow
+from rbfrag.solver.kind import Kind, RunEnd, Runner, Shaking, SupportedBlock
 from rbfrag.solver.quantity import finite_or_none
 from rbfrag.solver.results import (
     BlockState,
@@ -32,7 +38,8 @@ from rbfrag.solver.results import (
     Response,
     ResponseHistory,
 )
-from rbfrag.solver.stability.modes import ModeName
+from rbfrag.solver.stability.modes import ModeName, words_of_mode
+from rbfrag.solver.stability.single import require_stable, stability
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,8 +143,7 @@ class Simulation:
     def changes(self) -> tuple[ModeChange, ...]:
         """Changes of mode after the first motion."""
         changes = () if self.run is None else self.run.changes
-        free_changes = () if self.free_motion is None else self.free_motion.changes
-        return (*(ModeChange(change.time_s, change.name) for change in changes), *free_changes)
+        return changes if self.free_motion is None else (*changes, *self.free_motion.changes)
 
     @property
     def final_mode(self) -> ModeName | None:
@@ -299,7 +305,11 @@ def response_of(kind: str, simulation: Simulation, shaking: Shaking) -> Response
     steps, moved = (0, 0) if run is None else (run.steps, run.samples_moved)
     if simulation.free_motion is not None:
         steps += simulation.free_motion.steps
-        moved += _samples(excited, simulation)
+        # the sample intervals that were integrated step by step
+        history = simulation.free_motion.history
+        is_moving = (history.rate_rad_s != 0.0) | (history.slip_m_s != 0.0)
+        moving_s = history.time_s[is_moving]
+        moved += int(np.unique(np.searchsorted(excited.time_s, moving_s)).size)
     error = simulation.error if shaking.laws else simulation.step_error
     sentences = simulation.sentences
     if error == math.inf:
@@ -315,7 +325,7 @@ def response_of(kind: str, simulation: Simulation, shaking: Shaking) -> Response
         error_estimate=finite_or_none(error),
         steps=steps,
         samples_moved=moved,
-        samples_total=int(np.count_nonzero(excited.interval_s)),
+        samples_total=excited.samples_total,
         warnings=(*shaking.warnings, *(Diagnostic(text, "model_limits") for text in sentences)),
         history=_history(simulation, excited) if shaking.history else None,
         final_theta_rad=abs(at_end.turned_rad) if peak_rad is not None and at_end else None,
@@ -329,38 +339,35 @@ def response_of(kind: str, simulation: Simulation, shaking: Shaking) -> Response
     )
 
 
-def _samples(excited: Excitation, simulation: Simulation) -> int:
-    """Return the number of sample intervals that were integrated step by step."""
-    assert simulation.free_motion is not None
-    history = simulation.free_motion.history
-    moving = history.time_s[(history.rate_rad_s != 0.0) | (history.slip_m_s != 0.0)]
-    return int(np.unique(np.searchsorted(excited.time_s, moving)).size)
-
-
-def _of_mechanism(mechanism: Mechanism, history: MotionHistory) -> Kinematics:
-    nothing = np.zeros_like(history.rate)
-    return Kinematics(
-        history.time_s,
-        np.array([pose.turned_rad for pose in history.poses]),
-        history.rate if mechanism.rotates else nothing,
-        np.array([pose.centroid_m for pose in history.poses]),
-        np.array([pose.displacement_m for pose in history.poses]),
-        nothing if mechanism.rotates else history.rate,
-        history.strength_g,
-    )
-
-
 def _history(simulation: Simulation, excited: Excitation) -> ResponseHistory:
     """Insert the nodes of rest, which the kernels skip, between those of motion."""
     mechanism = simulation.mechanism
     parts = []
     if simulation.run is not None and simulation.run.history is not None:
-        parts.append(_of_mechanism(mechanism, simulation.run.history))
+        of_run = simulation.run.history
+        nothing = np.zeros_like(of_run.rate)
+        parts.append(
+            Kinematics(
+                of_run.time_s,
+                np.array([pose.turned_rad for pose in of_run.poses]),
+                of_run.rate if mechanism.rotates else nothing,
+                np.array([pose.centroid_m for pose in of_run.poses]),
+                np.array([pose.displacement_m for pose in of_run.poses]),
+                nothing if mechanism.rotates else of_run.rate,
+                of_run.strength_g,
+            )
+        )
     if simulation.free_motion is not None:
         parts.append(simulation.free_motion.history)
     trajectory = Kinematics(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))
     time_s = trajectory.time_s
-    rest = _nodes_of_rest(trajectory, excited)
+    nodes_s = excited.time_s
+    # a block that has not come to rest has failed, or left the model: nothing follows
+    if time_s.size and (
+        time_s[-1] >= nodes_s[-1] or trajectory.rate_rad_s[-1] or trajectory.slip_m_s[-1]
+    ):
+        nodes_s = nodes_s[nodes_s < time_s[-1]]
+    rest = nodes_s[~np.isin(nodes_s, time_s)]
     order = np.argsort(np.concatenate([time_s, rest]), kind="stable")
     at_s = np.concatenate([time_s, rest])[order]
     last = np.searchsorted(time_s, rest, side="right") - 1
@@ -378,7 +385,12 @@ def _history(simulation: Simulation, excited: Excitation) -> ResponseHistory:
         np.concatenate([values, np.zeros(rest.size)])[order]
         for values in (trajectory.rate_rad_s, trajectory.slip_m_s)
     )
-    at_start, strength = _at_start(simulation)
+    # position of the block at the start, and its strength there; NaN if undefined
+    state, first = simulation.start, mechanism.first
+    at_start, strength = first.pose(0.0), first.forward.threshold(0.0)
+    if state is not None:
+        at_start = Pose(state.turned_rad, state.centroid_m, state.displacement_m)
+        strength = math.nan if state.position is None else first.forward.threshold(state.position)
     k_h, k_v = _accelerations(excited, at_s)
     turned = merged(trajectory.turned_rad, at_start.turned_rad)
     return ResponseHistory(
@@ -395,27 +407,6 @@ def _history(simulation: Simulation, excited: Excitation) -> ResponseHistory:
     )
 
 
-def _nodes_of_rest(trajectory: Kinematics, excited: Excitation) -> FloatArray:
-    """Return the times of the nodes that were skipped [s]."""
-    time_s = trajectory.time_s
-    nodes_s = excited.time_s
-    # a block that has not come to rest has failed, or left the model: nothing follows
-    if time_s.size and (
-        time_s[-1] >= nodes_s[-1] or trajectory.rate_rad_s[-1] or trajectory.slip_m_s[-1]
-    ):
-        nodes_s = nodes_s[nodes_s < time_s[-1]]
-    return nodes_s[~np.isin(nodes_s, time_s)]
-
-
-def _at_start(simulation: Simulation) -> tuple[Pose, float]:
-    """Return the position of the block at the start, and its strength there; NaN if undefined."""
-    state, first = simulation.start, simulation.mechanism.first
-    if state is None:
-        return first.pose(0.0), first.forward.threshold(0.0)
-    strength = math.nan if state.position is None else first.forward.threshold(state.position)
-    return Pose(state.turned_rad, state.centroid_m, state.displacement_m), strength
-
-
 def _accelerations(excited: Excitation, at_s: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return k_h and k_v [g] at times of which each jump has two."""
     k_h = np.interp(at_s, excited.time_s, excited.k_h, right=0.0)
@@ -426,3 +417,139 @@ def _accelerations(excited: Excitation, at_s: FloatArray) -> tuple[FloatArray, F
         if before + 1 < at_s.size and at_s[before] == at_s[before + 1] == excited.time_s[jump]:
             k_h[before], k_v[before] = excited.k_h[jump], excited.w[jump] - 1.0
     return k_h, k_v
+
+
+def driven_up_below(supported_block: SupportedBlock) -> float:
+    """Return the k_h/(1 + k_v) below which the entire block slides up its back plane.
+
+    -tan(γ + β + φ_back); minus infinity for a block that no pulse drives up it.
+    """
+    if supported_block.block is None or not supported_block.back_fracture:
+        return -math.inf
+    steepness = (
+        math.radians(supported_block.block.gamma_deg)
+        + supported_block.beta_rad
+        + supported_block.phi_back_rad
+    )
+    return -math.tan(steepness) if steepness < 0.5 * math.pi else -math.inf
+
+
+class MechanismKind(Kind):
+    """A kind defined by a mechanism, which the engine for one degree of freedom integrates.
+
+    Attributes:
+        yield_name: symbol of its yield acceleration.
+    """
+
+    yield_name = "k"
+    carries_state = True
+
+    def mechanism(self, supported_block: SupportedBlock) -> Mechanism:
+        """Return the mechanism of a block."""
+        raise NotImplementedError
+
+    def respond(self, supported_block: SupportedBlock, shaking: Shaking) -> Response:
+        """Return the response of the block.
+
+        Raises:
+            InputError: the base has cohesion.
+        """
+        mechanism = self._without_cohesion(supported_block)
+        excited = shaking.excitation
+        simulation = simulate_block(
+            mechanism, supported_block, excited, history=shaking.history, start=shaking.start,
+            stepwise=shaking.stepwise,
+        )  # fmt: skip
+        return response_of(self.kind, simulation, shaking)
+
+    def runner(self, supported_block: SupportedBlock) -> Runner:
+        """Return a function that gives the end of the block's run under an excitation."""
+        mechanism = self._without_cohesion(supported_block)
+
+        def run(excited: Excitation) -> RunEnd:
+            return end_of(
+                simulate_block(mechanism, supported_block, excited), self.mode, mechanism.warnings
+            )
+
+        return run
+
+    def _without_cohesion(self, supported_block: SupportedBlock) -> Mechanism:
+        if supported_block.cohesive:
+            raise InputError(
+                f"cohesion_pa cannot be combined with {self.kind} in time: cohesion is lost at "
+                "the first slip, which the model does not describe; see rbfrag block for its "
+                "effect on the yield"
+            )
+        return self.mechanism(supported_block)
+
+
+@dataclass(frozen=True, eq=False)
+class ShakenMechanism:
+    """A stable block with a rotational mechanism.
+
+    Args:
+        mechanism: its motion.
+        yield_name: symbol of the yield acceleration.
+        yield_g: acceleration that starts it where 1 + k_v = 1 [g].
+        p2: frequency parameter p_s² at rest [1/s²].
+        remarks: what is known about the block that an answer should say.
+    """
+
+    kind: str
+    mechanism: Mechanism
+    yield_name: str
+    yield_g: float
+    p2: float
+    remarks: tuple[str, ...]
+    supported_block: SupportedBlock
+
+    def run(self, excited: Excitation, *, stepwise: bool = True) -> Simulation:
+        """Simulate the block under an excitation; `stepwise` as of :func:`simulate_block`."""
+        return simulate_block(self.mechanism, self.supported_block, excited, stepwise=stepwise)
+
+
+def shaken_mechanism(
+    model: Kind,
+    block: Block,
+    *,
+    beta_deg: float,
+    phi_deg: float,
+    phi_back_deg: float | None = None,
+    **water: Any,
+) -> ShakenMechanism:
+    """Return the mechanism of a block whose failure mode is that of the kind.
+
+    Args:
+        model: that of a kind that rotates, whose records are scaled.
+        block: shape and size.
+        beta_deg: dip of the base, out of the slope positive [deg].
+        phi_deg: friction angle of the base [deg].
+        phi_back_deg: friction angle of the back plane [deg]; None for that of the base.
+        water: ``water_m``, ``drainage`` and ``density_kg_m3`` of :func:`stability`.
+
+    Raises:
+        InputError: another kind; a block of another mode, or one that no earthquake decides about.
+    """
+    if not isinstance(model, MechanismKind):
+        raise InputError(f"records are not scaled for kind {model.kind!r}")
+    assessment = stability(
+        block, beta_deg=beta_deg, phi_deg=phi_deg, phi_back_deg=phi_back_deg, **water
+    )
+    require_stable(assessment)
+    if assessment.mode != model.mode:
+        raise InputError(
+            f"the block is not of kind {model.kind}: its mode is {words_of_mode(assessment.mode)} "
+            f"(yield {assessment.yield_acceleration:.4g} g, {assessment.state})"
+        )
+    supported_block = SupportedBlock.of(block, assessment, assessment.mode, {})
+    mechanism = model.mechanism(supported_block)
+    equation = mechanism.first.forward
+    return ShakenMechanism(
+        kind=model.kind,
+        mechanism=mechanism,
+        yield_name=model.yield_name,
+        yield_g=equation.threshold(0.0),
+        p2=equation.driving(0.0) / equation.inertia(0.0),
+        remarks=assessment.warnings,
+        supported_block=supported_block,
+    )

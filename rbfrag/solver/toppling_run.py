@@ -10,12 +10,12 @@ import numpy as np
 from rbfrag.errors import InputError
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.results.diagnostic import Diagnostic
-from rbfrag.solver.excitation import Excitation, excitation, motion_remarks
+from rbfrag.solver.excitation import Excitation, kept_excitation, motion_remarks
+from rbfrag.solver.history import node_history, with_free_motion
 from rbfrag.solver.integrator.taylor import ORDER, PH_MAX
 from rbfrag.solver.integrator.toppling_kernel import TOPPLED, Run, run_toppling
-from rbfrag.solver.node_history import node_history, with_free_motion
 from rbfrag.solver.quantity import finite_or_none, positive
-from rbfrag.solver.results import Outcome, Polarity, Response, ResponseHistory
+from rbfrag.solver.results import FloatArray, Outcome, Polarity, Response, ResponseHistory
 
 OUTCOMES = (Outcome.STABLE, Outcome.TOPPLED, Outcome.UNDETERMINED, Outcome.JUMP)
 """Outcome of each kernel code."""
@@ -55,10 +55,16 @@ def respond(
     """
     p2 = positive(p2, "p2", "1/s²")
     kr = positive(kr, "kr", "g")
-    excited = excitation(motion, vertical, polarity)
+    excited = kept_excitation(motion, vertical, polarity)
     reject_endless(excited, p2)
     run = simulate(excited, p2=p2, kr=kr)
     outcome = outcome_of(run)
+    warnings = [*motion_remarks(motion, vertical, excited)]
+    if outcome is Outcome.UNDETERMINED:
+        warnings.append(Diagnostic(outcome.advice, "undetermined"))
+    if outcome is Outcome.JUMP:
+        text = f"at {run.verdict_s:.3f} s: {outcome.advice}"
+        warnings.append(Diagnostic(text, "vertical_jump"))
     theta_c = math.atan(kr)
     has_peak = math.isfinite(run.peak_rad)
     return Response(
@@ -72,18 +78,30 @@ def respond(
         error_estimate=finite_or_none(run.error_rad),
         steps=run.steps,
         samples_moved=run.samples_moved,
-        samples_total=int(np.count_nonzero(excited.interval_s)),
-        warnings=_warnings(motion, vertical, excited, outcome, run),
+        samples_total=excited.samples_total,
+        warnings=tuple(warnings),
         history=history_of(excited, p2=p2, kr=kr) if history else None,
     )
 
 
 def simulate(
-    excited: Excitation, *, p2: float, kr: float, order: int = ORDER, ph_max: float = PH_MAX
+    excited: Excitation,
+    *,
+    p2: float,
+    kr: float,
+    rows: FloatArray = _NO_HISTORY,
+    order: int = ORDER,
+    ph_max: float = PH_MAX,
 ) -> Run:
-    """Run the kernel once; `order` and `ph_max` are there for convergence studies."""
-    p = math.sqrt(p2)
-    return Run(*run_toppling(excited.nodes, kr, p, order, ph_max, _NO_HISTORY, np.empty(9)))
+    """Run the kernel once.
+
+    Args:
+        excited: the excitation.
+        rows: history to be filled, shape (4, n).
+        order: order of the step; for convergence studies.
+        ph_max: greatest p·h of a step; for convergence studies.
+    """
+    return Run(*run_toppling(excited.nodes, kr, math.sqrt(p2), order, ph_max, rows, np.empty(9)))
 
 
 def outcome_of(run: Run) -> Outcome:
@@ -93,17 +111,12 @@ def outcome_of(run: Run) -> Outcome:
 
 def runner(excited: Excitation, *, p2: float) -> Callable[[float], Run]:
     """Return a function of k_r that runs the block of size p2 [1/s²] under one excitation."""
-    nodes, p = excited.nodes, math.sqrt(p2)
-
-    def run(kr: float) -> Run:
-        return Run(*run_toppling(nodes, kr, p, ORDER, PH_MAX, _NO_HISTORY, np.empty(9)))
-
-    return run
+    return lambda kr: simulate(excited, p2=p2, kr=kr)
 
 
 def reject_endless(excited: Excitation, p2: float) -> None:
     """Reject a block so small that one run would not end in reasonable time."""
-    steps = math.sqrt(p2) * float(excited.time_s[-1] - excited.time_s[0]) / PH_MAX
+    steps = math.sqrt(p2) * excited.duration_s / PH_MAX
     if steps > MOST_STEPS:
         raise InputError(
             f"p2 = {p2:g} 1/s² would take {steps:.1g} steps over this record: a block of 1 mm "
@@ -113,26 +126,9 @@ def reject_endless(excited: Excitation, p2: float) -> None:
 
 def history_of(excited: Excitation, *, p2: float, kr: float) -> ResponseHistory:
     """Repeat the run over the record and a stretch of rest after it, recording every node."""
-    p = math.sqrt(p2)
-    longer = with_free_motion(excited, p)
+    longer = with_free_motion(excited, math.sqrt(p2))
     # nodes, and at most a start, a peak and an impact twice in an interval
     rows = np.empty((4, 7 * longer.time_s.size + 8))
-    run = Run(*run_toppling(longer.nodes, kr, p, ORDER, PH_MAX, rows, np.empty(9)))
+    run = simulate(longer, p2=p2, kr=kr, rows=rows)
     columns = rows[:, : run.history_length]
     return node_history(excited, longer, columns, toppled=run.outcome == TOPPLED)
-
-
-def _warnings(
-    motion: GroundMotion,
-    vertical: GroundMotion | None,
-    excited: Excitation,
-    outcome: Outcome,
-    run: Run,
-) -> tuple[str, ...]:
-    warnings: list[str] = [*motion_remarks(motion, vertical, excited)]
-    if outcome is Outcome.UNDETERMINED:
-        warnings.append(Diagnostic(outcome.advice, "undetermined"))
-    if outcome is Outcome.JUMP:
-        text = f"at {run.verdict_s:.3f} s: {outcome.advice}"
-        warnings.append(Diagnostic(text, "vertical_jump"))
-    return tuple(warnings)

@@ -1,224 +1,24 @@
 """The quantities, each declared once, in groups in the order of the help, with their names.
 
-One module, and plain classes, because each start of the program loads and makes all of it.
+One module, because each start of the program loads all of it.
 """
 
 from __future__ import annotations
 
+from rbfrag.vocabulary.quantity import NOT_NEGATIVE, POSITIVE, Input, Limits, Measure, Quantity
+
 TYPE_CHECKING = False  # that of `typing` would load it
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Mapping
     from typing import Any
-
-
-class Limits:
-    """Permitted range of a quantity; None for no limit.
-
-    Args:
-        above: lower limit, excluded.
-        least: lower limit, included.
-        below: upper limit, excluded.
-        most: upper limit, included.
-    """
-
-    __slots__ = ("above", "below", "least", "most")
-
-    def __init__(
-        self,
-        above: float | None = None,
-        least: float | None = None,
-        below: float | None = None,
-        most: float | None = None,
-    ) -> None:
-        self.above, self.least, self.below, self.most = above, least, below, most
-
-    def holds(self, value: Any) -> Any:
-        """Return whether a number, or each of an array, lies within the range; NaN does not."""
-        inside = value == value
-        if self.above is not None:
-            inside = inside & (value > self.above)
-        if self.least is not None:
-            inside = inside & (value >= self.least)
-        if self.below is not None:
-            inside = inside & (value < self.below)
-        if self.most is not None:
-            inside = inside & (value <= self.most)
-        return inside
-
-    @property
-    def words(self) -> str:
-        """Text of the range."""
-        if self.above is not None and self.below is not None:
-            return f"between {self.above:g} and {self.below:g}"
-        high = "" if self.below is None else f"below {self.below:g}"
-        if self.most is not None:
-            high = f"up to {self.most:g}"
-        if self.above is not None:
-            return f"above {self.above:g} and {high}" if high else f"above {self.above:g}"
-        if self.least is not None:
-            least = f"{self.least:g}"
-            if self.most is not None:
-                return f"from {least} to {self.most:g}"
-            return f"at least {least}{f' and {high}' if high else ''}"
-        return high
-
-
-ANY, POSITIVE, NOT_NEGATIVE = Limits(), Limits(above=0.0), Limits(least=0.0)
-
-
-class Input:
-    """Names, type and help of an input quantity.
-
-    Args:
-        detail: addition to the label in the help; names in braces stand for their spelling in an
-            interface.
-        aliases: further names of its column, in small letters and without a unit.
-        default: value or rule where it is not given, for the help.
-        column: its column in tables that are written; empty for its name.
-        word: its name in options and requests; empty for its name without the unit.
-        type: float, str, or bool for a truth value that is true by default.
-    """
-
-    __slots__ = ("aliases", "column", "default", "detail", "type", "word")
-
-    def __init__(
-        self,
-        detail: str = "",
-        aliases: tuple[str, ...] = (),
-        *,
-        default: str = "",
-        column: str = "",
-        word: str = "",
-        type: type = float,
-    ) -> None:
-        self.detail, self.aliases, self.default = detail, aliases, default
-        self.column, self.word, self.type = column, word, type
-
-
-class Measure:
-    """Properties of an intensity measure.
-
-    Args:
-        title: name for people where that is not the symbol.
-        axis: label of an axis, without the unit; empty where no curve runs over it.
-        power: exponent of the amplitude of the shaking that it grows with; 0 for none.
-        period_s: oscillator period of a spectral acceleration [s].
-        imt: intensity measure type of OpenQuake; empty for none.
-        imt_factor: unit of that type in the unit of the quantity.
-        rank: position by skill among the measures that a shipped model reads alone; 0 for none.
-        uncertain: whether the standard deviation of its logarithm may be given.
-        top: strongest shaking that fragility functions for other tools cover.
-        largest: value beyond which the unit of a grid of shaking must be wrong.
-    """
-
-    __slots__ = (
-        "axis", "imt", "imt_factor", "largest", "period_s", "power", "rank", "title", "top",
-        "uncertain",
-    )  # fmt: skip
-
-    def __init__(
-        self,
-        title: str = "",
-        axis: str = "",
-        *,
-        power: int = 0,
-        period_s: float | None = None,
-        imt: str = "",
-        imt_factor: float = 1.0,
-        rank: int = 0,
-        uncertain: bool = False,
-        top: float | None = None,
-        largest: float | None = None,
-    ) -> None:
-        self.title, self.axis, self.power, self.period_s = title, axis, power, period_s
-        self.imt, self.imt_factor, self.rank, self.uncertain = imt, imt_factor, rank, uncertain
-        self.top, self.largest = top, largest
-
-
-class Quantity:
-    """One quantity: name, unit, symbol, range and texts.
-
-    Args:
-        name: name in Python, JSON and the database, with its unit.
-        label: noun phrase that begins its help and its description.
-        unit: its unit; empty for a pure number or a text.
-        symbol: its symbol in formulas.
-        range: the values that it may have.
-        input: its names as an input; None where it is not one.
-        credible: minimum and maximum credible value, and the warning about others.
-        prompt: description of a valid value, for errors; empty for one of label, unit and range.
-        measure: what makes it an intensity measure; None where it is none.
-        stored: its meaning as a column of the database; empty where it is none.
-    """
-
-    __slots__ = (
-        "_prompt", "credible", "input", "label", "measure", "name", "range", "stored", "symbol",
-        "unit",
-    )  # fmt: skip
-
-    def __init__(
-        self,
-        name: str,
-        label: str,
-        unit: str = "",
-        symbol: str = "",
-        range: Limits = ANY,
-        input: Input | None = None,
-        *,
-        credible: tuple[float, float, str] | None = None,
-        prompt: str = "",
-        measure: Measure | None = None,
-        stored: str = "",
-    ) -> None:
-        self.name, self.label, self.unit, self.symbol = name, label, unit, symbol
-        self.range, self.input, self.credible = range, input, credible
-        self._prompt, self.measure, self.stored = prompt, measure, stored
-
-    @property
-    def noun(self) -> str:
-        """The label within a sentence: "dip of the base"."""
-        text = self.label
-        for mark in ",;(":
-            text = text.partition(mark)[0]
-        text = text.rpartition(": ")[2].strip()
-        return f"{text[:1].lower()}{text[1:]}".removeprefix("the ")
-
-    @property
-    def prompt(self) -> str:
-        """Description of a valid value, for errors."""
-        limit = "0 or more" if self.range.above is None else f"above {self.range.above:g}"
-        return self._prompt or f"the {self.noun} in {self.unit}, {limit}"
-
-    def description(self, spell: Callable[[str], str]) -> str:
-        """Return label, details and default, with inputs in the spelling of an interface."""
-        text = self.label
-        if self.input is not None:
-            detail, default = self.input.detail, self.input.default
-            text += f"{', ' if detail and detail[0] not in ';:( ' else ''}{detail}"
-            text += f" [default: {default}]" if default else ""
-        return text.format_map(_Spelling(spell))
-
-    def help(self, spell: Callable[[str], str]) -> str:
-        """Return the description with the unit, which precedes the default."""
-        text, mark, default = self.description(spell).partition(" [default: ")
-        return f"{text}{f' [{self.unit}]' if self.unit else ''}{mark}{default}"
-
-
-class _Spelling(dict[str, str]):
-    """Names in the spelling of an interface, created on demand."""
-
-    def __init__(self, spell: Callable[[str], str]) -> None:
-        super().__init__()
-        self._spell = spell
-
-    def __missing__(self, name: str) -> str:
-        return self._spell(name)
-
 
 _SLOPE, _FRICTION = Limits(above=-90.0, below=90.0), Limits(least=0.0, below=90.0)
 _STEEP = "steeper than 78°: it is the tangent of an angle, not degrees"
 _SIGMA = "a standard deviation of a logarithm, 0 or more"
 _SAMPLES = "missing where the database was upgraded without the samples"
+
+MECHANISMS = ("unspecified", "strike-slip", "normal", "reverse")
+"""Fault mechanisms, in the order of their numbers."""
 
 
 def _block_scatter(name: str, logarithm: str) -> Quantity:
@@ -227,6 +27,19 @@ def _block_scatter(name: str, logarithm: str) -> Quantity:
         input=Input(),
         prompt=f"the standard deviation of ln {name.removesuffix('_sigma')}, 0 or more",
     )  # fmt: skip
+
+
+def _measured(name: str, noun: str, unit: str, *aliases: str) -> Quantity:
+    per_cent = "" if unit == "deg" else ", or in per cent (5%)"
+    detail = (
+        f"of repeated measurements{per_cent}: two of three lie within ± this; if ± is a limit that "
+        "is never exceeded, divide by 1.7; if it holds in 95 %, by 2"
+    )
+    label = f"Standard deviation of the {noun}"
+    prompt = f"the standard deviation of the measured {noun} in {unit}, 0 or more"
+    return Quantity(
+        name, label, unit, range=NOT_NEGATIVE, input=Input(detail, aliases), prompt=prompt
+    )
 
 
 def _deviation(name: str, measure: str) -> Quantity:
@@ -364,6 +177,28 @@ GROUPS: dict[str, tuple[Quantity, ...]] = {
             "uncertainty)", range=NOT_NEGATIVE, input=Input(),
             prompt="the standard deviation of the coefficient of restitution, 0 or more"),
     ),
+    "measurement": (
+        _measured("height_sigma_m", "height", "m"),
+        _measured("width_sigma_m", "width", "m"),
+        _measured("alpha1_sigma_deg", "angle of the heel", "deg"),
+        _measured("alpha3_sigma_deg", "angle of the toe", "deg"),
+        _measured("r3_sigma_m", "distance from centroid to toe", "m"),
+        _measured("s1_sigma_m", "spacing of the base fractures", "m"),
+        _measured("s2_sigma_m", "spacing of the back fractures", "m"),
+        _measured("gamma_sigma_deg", "angle between base and back plane", "deg"),
+        _measured("beta_sigma_deg", "dip of the base", "deg", "dip_sigma", "dip_sigma_deg"),
+        _measured("phi_sigma_deg", "friction angle of the base", "deg"),
+        _measured("phi_back_sigma_deg", "friction angle of the back plane", "deg"),
+        _measured("base_sigma_deg", "base in space, on its dip in the section", "deg"),
+        _measured("back_sigma_deg", "back plane in space, on its dip in the section", "deg"),
+        _measured("water_sigma_m", "height of the water", "m"),
+        _measured("cohesion_sigma_pa", "cohesion of the base", "Pa"),
+        _measured("density_sigma_kg_m3", "density of the rock", "kg/m³"),
+        Quantity(
+            "gmm_sigma", "Standard deviation of the logarithm of the median of ground-motion "
+            "models", range=NOT_NEGATIVE, input=Input("between models and regions; 0 for none",
+            default="0.20 with {magnitude} and {rjb_km}"), prompt=_SIGMA),
+    ),
     "space": (
         Quantity("base", "Orientation of the base as dip/dip direction in degrees",
             input=Input("such as 25/102, with {face}, instead of {beta_deg}", type=str)),
@@ -424,7 +259,7 @@ GROUPS: dict[str, tuple[Quantity, ...]] = {
             credible=(0.0, 50.0, "larger than ever recorded (it is in m/s): is it in cm/s?"),
             prompt="the Arias intensity in m/s, 0 or more",
             measure=Measure("Arias intensity", power=2),
-            stored=f"Arias intensity, pi/(2 g) integral of a²; {_SAMPLES}"),
+            stored=f"Arias intensity, pi/(2 g) integral of a² (Arias 1970); {_SAMPLES}"),
         Quantity("magnitude", "Magnitude of the earthquake", "", "M", Limits(above=0.0, most=10.0),
             Input(aliases=("mag", "mw", "moment_magnitude")),
             credible=(3.0, 9.6, "not the magnitude of an earthquake that models are fitted to"),
@@ -444,10 +279,12 @@ GROUPS: dict[str, tuple[Quantity, ...]] = {
         Quantity("rjb_km", "Distance R_JB to the surface projection of the rupture", "km",
             "R_JB", range=NOT_NEGATIVE,
             input=Input("with {magnitude} and {vs30_m_s}, instead of intensity measures",
-            ("rjb", "r_jb", "joyner_boore_distance"))),
+            ("rjb", "r_jb", "joyner_boore_distance")),
+            stored="distance R_JB of the station to the surface projection of the rupture"),
         Quantity(
             "vs30_m_s", "Time-averaged shear-wave velocity in the upper 30 m", "m/s",
-            "Vs30", range=POSITIVE, input=Input(aliases=("vs30",))),
+            "Vs30", range=POSITIVE, input=Input(aliases=("vs30",)),
+            stored="time-averaged shear-wave velocity of the site in the upper 30 m"),
         Quantity(
             "amplification", "Topographic amplification factor of all intensity measures",
             range=POSITIVE, input=Input()),
@@ -484,7 +321,8 @@ GROUPS: dict[str, tuple[Quantity, ...]] = {
     "source": (
         Quantity("mechanism", "Fault mechanism",
             input=Input(": strike-slip, normal, reverse or unspecified, with {rjb_km}",
-            default="unspecified", type=str)),
+            default="unspecified", type=str),
+            stored=f"fault mechanism: {', '.join(MECHANISMS)}"),
         Quantity("gmm", "CSV table of medians and sigmas of another ground-motion model",
             input=Input("with columns rjb_km, pgv_m_s, pgv_sigma, pgv_tau etc., one row per "
             "distance", type=str)),
@@ -499,12 +337,20 @@ GROUPS: dict[str, tuple[Quantity, ...]] = {
             input=Input("one for which a fragility model exists",
             default="failure past recovery")),
     ),
+    "inverse": (
+        Quantity("target_probability", "Probability to solve for", "", "P",
+            Limits(above=0.0, below=1.0), Input("with {solve_for}")),
+        Quantity("solve_for", "Quantity that is changed until P is {target_probability}",
+            input=Input(": width, height, dip, phi or kr", type=str)),
+    ),
     "arrays": (
         Quantity("nan", "Handling of invalid elements of arrays",
             input=Input(": propagate (NaN with its reason) or raise (the arrays are rejected)",
             default="propagate", type=str)),
         Quantity("interval", "Computation of confidence and prediction intervals",
             input=Input(": False leaves their limits NaN and takes less time", default="True")),
+        Quantity("sensitivity", "P at usual errors of measurement, by field",
+            input=Input("for blocks given by their geometry", default="False")),
         Quantity("weights", "Weights of the draws of one uncertain block",
             input=Input("1 for equal weights; the arrays of the block are then its draws, with one "
             "answer for all")),
@@ -522,8 +368,10 @@ GROUPS: dict[str, tuple[Quantity, ...]] = {
     "rows": (
         Quantity("mode", "Failure mode of the block",
             input=Input(aliases=("failure_mode",), type=str)),
-        Quantity("lon", "Longitude", "deg", input=Input(aliases=("longitude",))),
-        Quantity("lat", "Latitude", "deg", input=Input(aliases=("latitude",))),
+        Quantity("lon", "Longitude", "deg", input=Input(aliases=("longitude",)),
+            stored="longitude of the station, east positive"),
+        Quantity("lat", "Latitude", "deg", input=Input(aliases=("latitude",)),
+            stored="latitude of the station, north positive"),
         Quantity(
             "x", "Easting of the block in {crs}", input=Input(aliases=("easting", "x_m"))),
         Quantity("y", "Northing of the block in {crs}", input=Input(aliases=("northing", "y_m"))),
@@ -540,10 +388,24 @@ GROUPS: dict[str, tuple[Quantity, ...]] = {
         _stored_spectral("sa05_g", 0.5),
         _stored_spectral("sa20_g", 2.0),
         Quantity("cav_m_s", "Cumulative absolute velocity", "m/s", "CAV", measure=Measure(),
-            stored=f"cumulative absolute velocity, integral of |a|; {_SAMPLES}"),
+            stored=f"cumulative absolute velocity, integral of |a| (EPRI 1988); {_SAMPLES}"),
         Quantity("d5_95_s", "Significant duration", "s", "D_5-95", measure=Measure(),
-            stored="significant duration, from 5 to 95 % of the Arias intensity; missing where "
-            "the ground is at rest, and as the measures before it"),
+            stored="significant duration, from 5 to 95 % of the Arias intensity (Trifunac and "
+            "Brady 1975); missing where the ground is at rest, and as the measures before it"),
+        Quantity("d5_75_s", "Significant duration to 75 %", "s", "D_5-75", measure=Measure(),
+            stored="significant duration, from 5 to 75 % of the Arias intensity (Somerville et "
+            "al. 1997); missing as that to 95 %"),
+        Quantity("housner_m", "Housner intensity", "m", "SI", measure=Measure(),
+            stored="Housner intensity, integral of PSV from 0.1 to 2.5 s in steps of 0.05 s, 5 % "
+            f"damping (Housner 1952); {_SAMPLES}"),
+    ),
+    "stored metadata": (
+        Quantity("rrup_km", "Distance to the rupture", "km", "R_rup", NOT_NEGATIVE,
+            stored="shortest distance of the station to the rupture"),
+        Quantity("repi_km", "Distance to the epicentre", "km", "R_epi", NOT_NEGATIVE,
+            stored="distance of the station to the epicentre"),
+        Quantity("depth_km", "Depth of the hypocentre", "km", "", Limits(least=-10.0, most=800.0),
+            stored="depth of the hypocentre below sea level"),
     ),
     "derived": (
         Quantity("xp_m_s", "Toppling spectrum at the block's size", "m/s", "X(p)",
@@ -581,8 +443,10 @@ PLANES = _names("planes")
 JOINT = _names("joint")
 """What ends with the first slip of a block, and what is left then."""
 SCATTER = _names("block scatter")
-"""How well a block is known: the median is given, and P is the mean over the rest."""
+"""Standard deviations of uncertain block parameters, whose medians are given: P is the mean."""
 BLOCK = (*NUMBERS, *FAILURE, *SHAPE, *PLANES, *JOINT, *SCATTER)
+MEASURED = _names("measurement")
+"""How well a shape is measured, and the ground-motion model: only predictions integrate it."""
 SPACE = _names("space")
 """Planes in space, as dip/dip direction."""
 COMMON = _names("space", "whole")
@@ -605,15 +469,16 @@ RANGE = (*ANSWERING, *_names("sites"))
 SOURCE = _names("source")
 COMPONENT = _names("component")
 REQUEST = (*RANGE, *SOURCE, *COMPONENT, *_names("request"))
+INVERSE = _names("inverse")
+"""Which probability is asked for, and what is changed until a block has it."""
 ARRAYS = _names("arrays")
-QUESTION = (*BLOCKS, *SHAKING, *RECORD, *REQUEST, *ARRAYS)
+QUESTION = (*BLOCKS, *MEASURED, *SHAKING, *RECORD, *REQUEST, *INVERSE, *ARRAYS)
 """What :func:`rbfrag.predict` may be asked."""
 AT_REST = _names("at rest")
 ROW = (*_names("names"), "kind", *_names("rows"))
 """What a row of a table holds in addition to its block and its shaking."""
-COLUMNS = tuple(
-    dict.fromkeys((*BLOCK, *SHAKING, *COMPONENT, *ROW, *SPACE, *BY_ROW, "mechanism", "drainage"))
-)
+_OF_ROWS = (*ROW, *SPACE, *BY_ROW, "mechanism", "drainage")
+COLUMNS = tuple(dict.fromkeys((*BLOCK, *MEASURED, *SHAKING, *COMPONENT, *_OF_ROWS)))
 """What may be a column of a table."""
 
 PANELS = {
@@ -621,10 +486,10 @@ PANELS = {
     "Block parameters": (*NUMBERS, *FAILURE),
     "Block geometry": ("block", *SHAPE, *SPACE),
     "Joint properties": (*PLANES, *JOINT, *COMMON, *AT_REST),
-    "Block uncertainty": SCATTER,
+    "Block uncertainty": (*SCATTER, *MEASURED[:-1]),
     "Other intensity measures": (*INTENSITY, *COMPONENT, *RECORD),
-    "Scenario and ground-motion uncertainty": (*SCENE, *SOURCE),
-    "Model and confidence level": REQUEST,
+    "Scenario and ground-motion uncertainty": (*SCENE, *SOURCE, *MEASURED[-1:]),
+    "Model and confidence level": (*REQUEST, *INVERSE),
 }
 """Inputs by the headings of the help; an input belongs to the first group that holds it."""
 
@@ -635,10 +500,23 @@ SPECTRAL = {
 }
 """Spectral accelerations (5 % damping, one component) that can be given, by period [s]."""
 
-OTHER_WORDS = {"dip": "beta_deg"}
+OTHER_WORDS = {"dip": "beta_deg", "dip_sigma": "beta_sigma_deg"}
 """Further words for inputs, which shell and requests accept, too."""
 
 _UNITS = ("_kg_m3", "_deg", "_m_s", "_pa", "_km", "_m", "_g", "_s")
+
+
+ONLY_PREDICT = (
+    "{}: only predictions (predict) and responses of draws (respond) integrate errors of "
+    "measurement; rates and portfolios use the values as stated: omit it"
+)
+"""Why another answer does not take a standard deviation of :data:`MEASURED`."""
+
+
+def measured_by(sigma: str) -> str:
+    """Return the field that a standard deviation of :data:`MEASURED` belongs to."""
+    planes = {"base_sigma_deg": "base", "back_sigma_deg": "back", "gmm_sigma": "amplification"}
+    return planes.get(sigma) or sigma.replace("_sigma", "")
 
 
 def column_of(name: str) -> str:

@@ -6,7 +6,8 @@ Loaded only for documentation and OpenAPI; inputs and derived numbers of a quest
 
 from __future__ import annotations
 
-from rbfrag.vocabulary.quantities import QUANTITIES, Quantity
+from rbfrag.vocabulary.quantities import QUANTITIES
+from rbfrag.vocabulary.quantity import Quantity
 
 _GROUPS: dict[str, tuple[tuple[str, ...], ...]] = {
     "Probability of failure": (
@@ -27,6 +28,13 @@ _GROUPS: dict[str, tuple[tuple[str, ...], ...]] = {
         ("failure", "Limit state"),
         ("median_displacement_m", "Median permanent displacement", "m"),
         ("drained", "Answer without water pressure; null for a dry block"),
+        ("as_stated", "Answer without errors of measurement; null without them"),
+        ("fraction", "Fraction of the variance of the probit of P"),
+        ("field", "Field"),
+        ("step", "Error of measurement, in degrees or as a fraction of a length"),
+        ("solution", "Value at which P is the target; null without one"),
+        ("stated", "Value as stated"),
+        ("added_kr", "Increase of k_r, a horizontal force over the weight"),
         ("polarities", "Answers by polarity"),
         ("forward", "Answer for the forward polarity"),
         ("reverse", "Answer for the reverse polarity"),
@@ -168,6 +176,8 @@ _GROUPS: dict[str, tuple[tuple[str, ...], ...]] = {
         ("event_id", "Identifier of the earthquake"),
         ("recording", "Name of the recording"),
         ("station", "Station"),
+        ("network", "Network"),
+        ("attributes", "Further columns of the metadata"),
         ("orientation_deg", "Azimuth of a horizontal component", "deg"),
         ("is_vertical", "True if the component is vertical"),
         ("is_corrected", "True if the record is corrected for its baseline"),
@@ -181,6 +191,12 @@ _GROUPS: dict[str, tuple[tuple[str, ...], ...]] = {
         ("source_file", "Name of the file"),
         ("trace_index", "Number of the trace in the file, from 0"),
         ("processing_applied", "Processing by rbfrag"),
+        ("rotd50", "Medians over the directions of the recording"),
+        ("rotd100", "Maxima over the directions of the recording"),
+        ("percentile", "Percentile over the directions"),
+        ("azimuth_deg", "Azimuth of the positive direction, clockwise from north", "deg"),
+        ("motion_ids", "Ids of motions"),
+        ("pairs", "Ids of the two horizontal motions of each recording"),
         ("start_time", "Time of the first sample"),
         ("sha256", "SHA-256 of the samples"),
         ("source_sha256", "SHA-256 of the samples of the file"),
@@ -284,6 +300,7 @@ _GROUPS: dict[str, tuple[tuple[str, ...], ...]] = {
         ("revision", "Revision of the schema"),
         ("last_sound", "Time of the last check without findings, UTC"),
         ("default_model", "Default model of toppling"),
+        ("metadata", "Number of earthquakes or recordings with a value, by column"),
         ("numerics_versions", "Versions of the solver"),
         ("combinations_by_status", "Number of combinations by status of the search"),
         ("version", "Version of rbfrag"),

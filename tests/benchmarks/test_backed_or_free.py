@@ -26,23 +26,23 @@ the same equations. Chaos moves a share of 265 motions by up to 0.04."""
 def test_shares_are_those_of_an_independent_integration(records_dir: Path) -> None:
     motions = stored_motions(records_dir)
     assert len(motions) == 265
-    for (p2, number), (free, backed) in INDEPENDENT.items():
-        found = shares(motions, (p2,), backed_or_free.Y_OVER_PGV[[number]])
-        assert found.free.mean() == pytest.approx(free, abs=0.04)
-        assert found.backed.mean() == pytest.approx(backed, abs=0.04)
+    for (p2, number), (free_standing, backed) in INDEPENDENT.items():
+        result = shares(motions, (p2,), backed_or_free.Y_OVER_PGV[[number]])
+        assert result.free_standing.mean() == pytest.approx(free_standing, abs=0.04)
+        assert result.backed.mean() == pytest.approx(backed, abs=0.04)
 
 
 def test_the_table_has_every_size_and_what_is_thought_safe() -> None:
     motions = [GroundMotion(shaking(seed, npts=400), 0.02) for seed in range(3)]
-    found = shares(motions)
-    lines = table(found).splitlines()
+    result = shares(motions)
+    lines = table(result).splitlines()
     assert [line.split("|")[1].strip() for line in lines[2:]] == [f"{p2:g}" for p2 in DEFAULT_P2]
     shape = (2, 1, 3)
-    free = np.array([1.0, 0.0, 1.0, 0.0, 0.0, 1.0]).reshape(shape)
+    free_standing = np.array([1.0, 0.0, 1.0, 0.0, 0.0, 1.0]).reshape(shape)
     predicted = np.array([0.9, 0.01, 0.02, 0.9, 0.01, 0.01]).reshape(shape)
     below = np.array([True, True, True, True, True, False]).reshape(shape)
-    one = Shares(free, free, predicted, below)
-    assert one.where_thought_safe() == pytest.approx([1.0 / 3.0])
+    fractions = Shares(free_standing, free_standing, predicted, below)
+    assert fractions.where_thought_safe() == pytest.approx([1.0 / 3.0])
 
 
 def test_islands_are_counted() -> None:

@@ -26,39 +26,43 @@ FEW = [
 
 
 @pytest.fixture(scope="module")
-def known(records_dir: Path) -> list[Recording]:
+def all_recordings(records_dir: Path) -> list[Recording]:
     return recordings(records_dir)
 
 
 def test_all_parts_run_and_find_nothing_wrong(
-    known: list[Recording], records_dir: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    all_recordings: list[Recording],
+    records_dir: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(certify, "recordings", lambda folder: known)
-    found = certify.main(
+    monkeypatch.setattr(certify, "recordings", lambda folder: all_recordings)
+    result = certify.main(
         ["--records", str(records_dir), *FEW, "--out", str(tmp_path / "found.json")]
     )
-    assert json.loads((tmp_path / "found.json").read_text())["records"] == found["records"] == 265
-    assert found["with_vertical"] == 152
-    assert found["combinations"]["horizontal"]["combinations"] == 2
-    assert found["combinations"]["with vertical"]["of_these_not_certified"] == []
-    assert found["islands"]["with_islands"] == 1
-    assert found["islands"]["contradictions"] == []
-    assert found["intervals"]["intervals"] >= 200
-    assert found["intervals"]["contradictions"] == []
-    assert found["borders"]["wrong"] == []
-    assert found["borders"]["by_distance"]["1e-10"]["other"] == 0
-    assert found["accuracy"]["wrong_outcomes"] == 0
-    assert found["accuracy"]["peak_error_relative"]["greatest"] < 1e-9
-    assert found["digits"]["change_of_kr_over_pga_greatest"] < 1e-2
-    assert found["accuracy"]["estimates_that_are_no_bound"] == 0
+    assert json.loads((tmp_path / "found.json").read_text())["records"] == result["records"] == 265
+    assert result["with_vertical"] == 152
+    assert result["combinations"]["horizontal"]["combinations"] == 2
+    assert result["combinations"]["with vertical"]["of_these_not_certified"] == []
+    assert result["islands"]["with_islands"] == 1
+    assert result["islands"]["contradictions"] == []
+    assert result["intervals"]["intervals"] >= 200
+    assert result["intervals"]["contradictions"] == []
+    assert result["borders"]["wrong"] == []
+    assert result["borders"]["by_distance"]["1e-10"]["other"] == 0
+    assert result["accuracy"]["wrong_outcomes"] == 0
+    assert result["accuracy"]["peak_error_relative"]["greatest"] < 1e-9
+    assert result["digits"]["change_of_kr_over_pga_greatest"] < 1e-2
+    assert result["accuracy"]["estimates_that_are_no_bound"] == 0
 
 
-def test_the_same_seed_draws_the_same(known: list[Recording]) -> None:
-    one, other = (
-        [c.name for c in certify._mixed(known, np.random.default_rng(3), 50)] for _ in range(2)
+def test_the_same_seed_draws_the_same(all_recordings: list[Recording]) -> None:
+    first, other = (
+        [c.name for c in certify._mixed(all_recordings, np.random.default_rng(3), 50)]
+        for _ in range(2)
     )
-    assert one == other
-    assert len(set(one)) == len(one) == 66
+    assert first == other
+    assert len(set(first)) == len(first) == 66
 
 
 PULSE = GroundMotion.from_nodes([0.0, 0.2, 0.4], [0.0, 0.5, 0.0])
@@ -79,9 +83,9 @@ def test_a_border_that_is_not_there_is_no_border() -> None:
     result = critical(PULSE, p2=5.0)
     assert result.kr is not None
     excited = excitation(PULSE)
-    found = borders.border(excited, 5.0, result.kr, result.kr * (1.0 + 1e-9))
-    assert found is not None
-    assert found[0] + found[1] == pytest.approx(result.kr, rel=1e-8)
+    outcome = borders.border(excited, 5.0, result.kr, result.kr * (1.0 + 1e-9))
+    assert outcome is not None
+    assert outcome[0] + outcome[1] == pytest.approx(result.kr, rel=1e-8)
     assert borders.border(excited, 5.0, 1.1 * result.kr, 1.1 * result.kr * (1.0 + 1e-9)) is None
 
 
@@ -92,5 +96,5 @@ def test_safe_islands_are_runs_between_two_that_topple() -> None:
     class Result:
         intervals = OutcomeIntervals(edges[:-1], edges[1:], words)  # type: ignore[arg-type]
 
-    found: CriticalResult = Result()  # type: ignore[assignment]
-    assert islands.safe_islands(found) == pytest.approx([0.2])
+    result: CriticalResult = Result()  # type: ignore[assignment]
+    assert islands.safe_islands(result) == pytest.approx([0.2])

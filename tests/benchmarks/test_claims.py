@@ -18,8 +18,8 @@ from benchmarks.claims.records import (
     pulses_as_bounds,
     rank_of_terms,
     variance_linear,
+    vertical_is_irrelevant,
 )
-from benchmarks.claims.vertical import vertical_is_irrelevant
 from rbfrag.db.rows import CombinationTable
 from rbfrag.errors import FitError
 from rbfrag.plots.critical_strength import pulse_line, vertical_pairs
@@ -164,9 +164,9 @@ def test_motion_set_does_not_depend_on_the_order_of_rows() -> None:
     }
     order = np.random.default_rng(5).permutation(data.p2.size)
     turned = data.only(order)
-    (here,), (there,) = motion_set(data, sets, seed=1), motion_set(turned, sets, seed=1)
-    assert here.statistic == there.statistic
-    assert here.value == pytest.approx(there.value)
+    (claim,), (there,) = motion_set(data, sets, seed=1), motion_set(turned, sets, seed=1)
+    assert claim.statistic == there.statistic
+    assert claim.value == pytest.approx(there.value)
 
 
 def test_pulses_as_bounds() -> None:
@@ -206,9 +206,9 @@ def test_vertical_verdicts() -> None:
     little = vertical_is_irrelevant(without, shaken(np.exp(0.02 * random)), seed=1)
     assert [c.verdict for c in little] == ["confirmed", "confirmed"]
     lost = np.where(np.arange(n) < 7, "below_limit", "found").astype(object)
-    some = vertical_is_irrelevant(without, replace(without, status=lost), seed=1)
-    assert "7 pairs of which only one was found" in some[0].statistic
-    assert some[0].n == n - 7
+    claims = vertical_is_irrelevant(without, replace(without, status=lost), seed=1)
+    assert "7 pairs of which only one was found" in claims[0].statistic
+    assert claims[0].n == n - 7
     stronger = vertical_is_irrelevant(without, shaken(np.exp(0.1 + 0.2 * random)), seed=1)
     assert [c.verdict for c in stronger] == ["refuted", "refuted"]
 

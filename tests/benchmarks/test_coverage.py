@@ -36,9 +36,9 @@ def test_intervals_hold_the_truth_as_often_as_they_say(study: Study) -> None:
 
 
 def test_ranges_hold_what_fell_in_earthquakes_left_out(study: Study) -> None:
-    found = range_coverage(study.blocks, study.laws)
-    assert found.holds
-    assert min(found.numbers) > 150
+    result = range_coverage(study.blocks, study.laws)
+    assert result.holds
+    assert min(result.numbers) > 150
     # not what earthquakes do whose P is that of a steeper model
     p = ndtr(1.5 * ndtri(study.blocks["probability"]))
     drawn = (np.random.default_rng(0).random(p.size) < p).astype(float)

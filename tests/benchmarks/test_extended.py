@@ -11,7 +11,7 @@ import pytest
 from benchmarks.extended import double_double as dd
 from benchmarks.extended.toppling import truth
 from benchmarks.reference import reference
-from rbfrag.bench.cases import BenchCase
+from rbfrag.bench.peers import BenchCase
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.solver.excitation import excitation
 from tests.solver.reference import integrate
@@ -80,13 +80,13 @@ def record(seed: int) -> GroundMotion:
 def test_shorter_steps_change_nothing(seed: int, p2: float) -> None:
     excited = excitation(record(seed), record(seed + 7))
     for kr in (0.05, 0.12, 0.2):
-        one = truth(excited, p2=p2, kr=kr)
+        first = truth(excited, p2=p2, kr=kr)
         other = truth(excited, p2=p2, kr=kr, ph_max=0.006 * p2**0.5, smallest=1e-36)
-        assert other.steps > one.steps
-        assert (one.outcome, one.intervals_moved) == (other.outcome, other.intervals_moved)
-        if one.outcome == "stable":
-            change = (one.peak_rad - other.peak_rad) + (one.peak_low_rad - other.peak_low_rad)
-            assert abs(change) < 1e-27 * one.peak_rad
+        assert other.steps > first.steps
+        assert (first.outcome, first.intervals_moved) == (other.outcome, other.intervals_moved)
+        if first.outcome == "stable":
+            change = (first.peak_rad - other.peak_rad) + (first.peak_low_rad - other.peak_low_rad)
+            assert abs(change) < 1e-27 * first.peak_rad
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -114,9 +114,9 @@ def test_energy_between_jumps_is_kept_to_30_digits() -> None:
         [0.0, 0.0, 0.1, 0.1, 0.4, 0.4, 3.0], [0.0, 0.5, 0.5, 0.5, 0.5, 0.0, 0.0]
     )
     short = GroundMotion.from_nodes([0.0, 0.0, 0.4, 0.4], [0.0, 0.5, 0.5, 0.0])
-    whole, other, closed = (truth(excitation(m), p2=4.0, kr=kr) for m in (once, cut, short))
-    assert whole.outcome == "stable"
+    full, other, closed = (truth(excitation(m), p2=4.0, kr=kr) for m in (once, cut, short))
+    assert full.outcome == "stable"
     for run in (other, closed):
-        change = (run.peak_rad - whole.peak_rad) + (run.peak_low_rad - whole.peak_low_rad)
+        change = (run.peak_rad - full.peak_rad) + (run.peak_low_rad - full.peak_low_rad)
         # 0.4 - 0.1 is not 0.3 in doubles: the cut record lasts some 1e-17 s longer
         assert abs(change) < (1e-15 if run is other else 1e-29)

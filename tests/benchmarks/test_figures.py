@@ -12,7 +12,7 @@ CAPTIONS = commands()
 
 def test_the_figures_of_the_reference_are_among_them() -> None:
     drawn = {figure_of(arguments).removeprefix("docs/figures/") for _, arguments in CAPTIONS}
-    assert drawn >= {"chart.svg", "curve.svg", "fit.svg", "calibration.svg", "sensitivity.svg",
+    assert drawn >= {"chart.svg", "curve.svg", "fit.svg", "calibration.svg", "critical.svg",
                      "vertical.svg", "failure-modes.svg", "block.svg"}  # fmt: skip
     assert len(CAPTIONS) == len(drawn)
 

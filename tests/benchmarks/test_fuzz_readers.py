@@ -12,8 +12,8 @@ from benchmarks import fuzz_readers
 from benchmarks.damage import EDITS, Damage, damaged
 from benchmarks.silent_changes import change
 from rbfrag.errors import MotionFileError
-from rbfrag.motions.text import header_check
-from tests.motions.test_header_check import MISTAKES, made
+from rbfrag.motions import header_check
+from tests.motions.test_header_check import MISTAKES, file_text
 
 
 def test_it_runs_and_repeats(capsys: pytest.CaptureFixture[str]) -> None:
@@ -66,9 +66,9 @@ def test_a_silent_change_is_seen(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
 ) -> None:
     def became() -> Counter[str]:
-        content, path = made(name).encode(), tmp_path / "record"
-        found = (change(name, content, path, Random(seed), None, None) for seed in range(60))
-        return Counter(became for became, kind, _ in found if kind != "other")
+        content, path = file_text(name).encode(), tmp_path / "record"
+        results = (change(name, content, path, Random(seed), None, None) for seed in range(60))
+        return Counter(became for became, kind, _ in results if kind != "other")
 
     assert became()["rejected"] > 5
     assert not became()["silent"]

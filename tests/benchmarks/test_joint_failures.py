@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from benchmarks.joint_failures import PLACES, Line, placement_of, portfolio
+from benchmarks.joint_failures import PLACEMENTS, Line, placement_of, portfolio
 
 
 def blocks() -> pd.DataFrame:
@@ -18,10 +18,10 @@ def blocks() -> pd.DataFrame:
     })  # fmt: skip
 
 
-@pytest.mark.parametrize("place", PLACES)
+@pytest.mark.parametrize("place", PLACEMENTS)
 def test_portfolios_hold_blocks_of_one_place(place: str) -> None:
-    own, random = blocks(), np.random.default_rng(1)
-    drawn = [rows for _ in range(200) if (rows := portfolio(own, place, random)) is not None]
+    sample, random = blocks(), np.random.default_rng(1)
+    drawn = [rows for _ in range(200) if (rows := portfolio(sample, place, random)) is not None]
     assert len(drawn) > 50
     for rows in drawn:
         assert 10 <= len(rows) == rows.index.nunique() <= 50

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -12,6 +13,7 @@ from benchmarks.held_out import FOLDS, Outcomes, folds, outcomes, predictions, r
 from benchmarks.model_choice import (
     MODELS,
     Aims,
+    Mark,
     Predicted,
     calibration_slope,
     class_table,
@@ -28,7 +30,7 @@ from rbfrag.fragility.fit.data import FitSource
 
 
 @pytest.fixture(scope="module")
-def some() -> tuple[FitSource, Outcomes]:
+def study_data() -> tuple[FitSource, Outcomes]:
     source, _ = read(REFERENCE)
     source = source.only(
         np.isin(source.table.p2, (10.0, 1.0, 0.3)) & (source.table.motion_id % 4 == 0)
@@ -37,24 +39,24 @@ def some() -> tuple[FitSource, Outcomes]:
 
 
 @pytest.fixture(scope="module")
-def pgv_pga(some: tuple[FitSource, Outcomes]) -> Predicted:
-    return predicted(some[0], MODELS["bounded-pgv_pga"])
+def pgv_pga(study_data: tuple[FitSource, Outcomes]) -> Predicted:
+    return predicted(study_data[0], MODELS["bounded-pgv_pga"])
 
 
-def test_the_order_of_rows_does_not_matter(some: tuple[FitSource, Outcomes]) -> None:
-    source, data = some
+def test_the_order_of_rows_does_not_matter(study_data: tuple[FitSource, Outcomes]) -> None:
+    source, data = study_data
     shuffled = source.only(np.random.default_rng(0).permutation(source.table.p2.size))
-    straight, mixed = (studied(each, data, "pgv_pga") for each in (source, shuffled))
-    assert mixed.own == pytest.approx(straight.own, abs=1e-9)
+    straight, mixed = (studied(item, data, "pgv_pga") for item in (source, shuffled))
+    assert mixed.held_out == pytest.approx(straight.held_out, abs=1e-9)
     # rows of fits stand in their own orders: by number their blocks are others
     other = studied(source, data, "record")
     assert (straight.data.values["p2"] != other.data.values["p2"]).any()
 
 
 def test_a_prediction_is_of_the_block_that_it_is_joined_to(
-    some: tuple[FitSource, Outcomes],
+    study_data: tuple[FitSource, Outcomes],
 ) -> None:
-    source, data = some
+    source, data = study_data
     study = studied(source, data, "record")
     y_m_s = predictions(source, study.data, study.data.grid("y_m_s"))
     assert np.array_equal(data.joined(y_m_s), data.value["y"])
@@ -64,8 +66,8 @@ def test_a_prediction_is_of_the_block_that_it_is_joined_to(
         studied(twice, data, "record")
 
 
-def test_fitted_blocks_stand_where_their_motions_do(some: tuple[FitSource, Outcomes]) -> None:
-    source, data = some
+def test_fitted_blocks_stand_where_their_motions_do(study_data: tuple[FitSource, Outcomes]) -> None:
+    source, data = study_data
     study = studied(source, data, "pgv_pga")
     placed, rows = study.placement, study.rows
     assert len(placed.earthquake) == rows.place.size
@@ -84,20 +86,20 @@ def test_earthquakes_are_dealt_whole() -> None:
 
 
 def test_a_model_is_judged_on_what_it_has_not_seen(
-    some: tuple[FitSource, Outcomes], pgv_pga: Predicted
+    study_data: tuple[FitSource, Outcomes], pgv_pga: Predicted
 ) -> None:
     assert pgv_pga.kr is not None
     assert pgv_pga.kr.min() >= 0.02
-    assert pgv_pga.failed.size == some[1].failed.size
+    assert pgv_pga.failed.size == study_data[1].failed.size
     # turned about, the outcomes of one fold change nothing of what is said of them
-    source = some[0]
+    source = study_data[0]
     names, event = np.unique(source.table.event_id.astype(str), return_inverse=True)
-    one = folds(event) == 3
-    turned = replace(source, failed=np.where(one[:, None], 1.0 - source.failed, source.failed))
+    first = folds(event) == 3
+    turned = replace(source, failed=np.where(first[:, None], 1.0 - source.failed, source.failed))
     again = predicted(turned, MODELS["bounded-pgv_pga"])
     assert names.size == pgv_pga.event.max() + 1
     same = np.isclose(again.p, pgv_pga.p, rtol=0.0, atol=1e-3)
-    turned_events = np.isin(pgv_pga.event, np.unique(event[one]))
+    turned_events = np.isin(pgv_pga.event, np.unique(event[first]))
     assert same[turned_events].all()
     assert not same[~turned_events].all()
 
@@ -157,13 +159,13 @@ def test_an_aim_that_is_missed_is_told() -> None:
 
 
 def test_every_model_has_a_line(pgv_pga: Predicted) -> None:
-    found = {"bounded-pgv_pga": pgv_pga}
-    (line,) = score_table(found).splitlines()[2:]
+    results = {"bounded-pgv_pga": pgv_pga}
+    (line,) = score_table(results).splitlines()[2:]
     assert "pgv, pga" in line
     assert f"{pgv_pga.loss:.4f} ±" in line
-    assert len(class_table(found).splitlines()) == 2 + 5
-    assert len(class_table(found, "p2").splitlines()) == 2 + 3
-    by_magnitude = class_table(found, "magnitude").splitlines()
+    assert len(class_table(results).splitlines()) == 2 + 5
+    assert len(class_table(results, "p2").splitlines()) == 2 + 3
+    by_magnitude = class_table(results, "magnitude").splitlines()
     assert [line.split(" | ")[0] for line in by_magnitude[2:]] == [
         "| M < 5.6", "| M 5.6 to 6", "| M 6 to 6.5", "| M 6.5 to 7.5", "| M ≥ 7.5",
     ]  # fmt: skip
@@ -174,13 +176,23 @@ def test_an_intercept_of_a_class_of_magnitude_is_told() -> None:
     magnitude = np.where(of_kr.event < 20, 5.0, 7.0)
     # small earthquakes are told too little
     p = np.where(magnitude < 6.0, expit(logit(of_kr.p) - 1.0), of_kr.p)
-    found = Predicted(p, of_kr.failed, of_kr.event, magnitude=magnitude)
-    small, *_, great, greatest = found.intercepts
+    result = Predicted(p, of_kr.failed, of_kr.event, magnitude=magnitude)
+    small, *_, great, greatest = result.intercepts
     assert small == pytest.approx(1.0, abs=0.1)
     assert great == pytest.approx(0.0, abs=0.1)
     assert np.isnan(greatest)
-    (mark,) = marks("m", Aims("displacement", "pgv_pga_m", "sliding", intercept=0.9), found)
+    (mark,) = marks("m", Aims("displacement", "pgv_pga_m", "sliding", intercept=0.9), result)
     assert not mark.reached
-    (mark,) = marks("m", Aims("displacement", "pgv_pga_m", "sliding", intercept=1.2), found)
+    (mark,) = marks("m", Aims("displacement", "pgv_pga_m", "sliding", intercept=1.2), result)
     assert mark.reached
-    assert tables_of({"sliding-pgv_pga_m": found}) == {}
+    assert tables_of({"sliding-pgv_pga_m": result}) == {}
+
+
+def test_a_mark_says_where_it_is_missed() -> None:
+    mark = Mark("a", "slope", 0.93, 1.07, 1.0)
+    assert mark.aim == "0.93 to 1.07"
+    assert mark.cell == "1"
+    assert Mark("a", "slope", 0.93, 1.07, 0.925).cell == "**0.925, missed**"
+    assert Mark("a", "slope", 0.93, 1.07, math.nan).cell == "**nan, missed**"
+    assert Mark("a", "gain", 0.02, math.inf, 0.03, also=("above 0", False)).cell != "0.03"
+    assert Mark("a", "loss", -math.inf, 0.1, 0.1).aim == "≤ 0.1"

@@ -8,8 +8,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks.other_kinds import RATIOS, class_lines, coefficient_lines, dependence_table
-from benchmarks.other_kinds_figure import plot_other_kinds
+from benchmarks.other_kinds import (
+    RATIOS,
+    class_lines,
+    coefficient_lines,
+    dependence_table,
+    plot_other_kinds,
+)
 from rbfrag.errors import InputError
 from rbfrag.fragility.fit.fitting import fit_source
 from rbfrag.fragility.measures import TERMS
@@ -40,8 +45,8 @@ def test_classes_are_judged_by_their_own_outcomes() -> None:
     assert shares[:, 0] == pytest.approx(shares[:, 1], abs=0.05)
     assert shares[0, 1] > shares[-1, 1] + 0.1
     # one class of everything
-    whole = class_lines("m", fit.result.held_out, fit.data, "d [m]", (0.0, math.inf))
-    assert float(whole[0][4]) == pytest.approx(fit.data.failed.mean(), abs=5e-4)
+    full = class_lines("m", fit.result.held_out, fit.data, "d [m]", (0.0, math.inf))
+    assert float(full[0][4]) == pytest.approx(fit.data.failed.mean(), abs=5e-4)
 
 
 def test_coefficients_stand_below_their_names() -> None:
@@ -57,8 +62,8 @@ def test_coefficients_stand_below_their_names() -> None:
 
 def test_what_blocks_share_is_listed() -> None:
     shares = {"rho_e": 0.4, "rho_s": 0.3, "rho_v": 0.2, "rho_o": 0.1}
-    known = row_of("sliding", dependence={**shares, "errors": dict.fromkeys(shares, 0.04)})
-    table = dependence_table([known, row_of("slumping", dependence=None)])
+    with_errors = row_of("sliding", dependence={**shares, "errors": dict.fromkeys(shares, 0.04)})
+    table = dependence_table([with_errors, row_of("slumping", dependence=None)])
     lines = [line for line in table.splitlines() if "`" in line]
     assert lines == [
         "| `sliding-pgv_pga` | 0.40 ± 0.04 | 0.30 ± 0.04 | 0.20 ± 0.04 | 0.10 ± 0.04 |"

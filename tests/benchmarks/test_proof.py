@@ -12,7 +12,7 @@ from flint import arb, ctx
 from benchmarks.certify.made_up import noise, plateaus, ties, vertical_of
 from benchmarks.certify.recordings import Combination, Recording
 from benchmarks.extended.toppling import truth
-from benchmarks.proof import above, brackets, tables
+from benchmarks.proof import above, brackets
 from benchmarks.proof.enclosed_run import (
     NOT_ENCLOSED,
     STABLE,
@@ -25,7 +25,7 @@ from benchmarks.proof.enclosed_run import (
     least_later_q,
 )
 from rbfrag.motions.ground_motion import GroundMotion
-from rbfrag.motions.pulses import reversal_pulse
+from rbfrag.motions.sample_motions import reversal_pulse
 from rbfrag.solver.excitation import excitation
 from rbfrag.solver.search.critical import critical
 from tests.synthetic import shaking
@@ -36,11 +36,11 @@ PULSE = GroundMotion.from_nodes([0.0, 0.2, 0.4], [0.0, 0.5, 0.0])
 @pytest.mark.parametrize("ratio", [0.35, 1.25])
 def test_both_ends_of_a_pulse(ratio: float) -> None:
     motion = reversal_pulse(1.0, ratio, 0.5, 0.01)
-    found = critical(motion, p2=2.0)
-    assert found.lower is not None
-    assert found.upper is not None
+    result = critical(motion, p2=2.0)
+    assert result.lower is not None
+    assert result.upper is not None
     excited = excitation(motion)
-    for kr, outcome in ((found.lower, TOPPLED), (found.upper, STABLE)):
+    for kr, outcome in ((result.lower, TOPPLED), (result.upper, STABLE)):
         for off in (0.0, 1e-6):
             sign = -1.0 if outcome == TOPPLED else 1.0
             proven = enclose(excited, p2=2.0, kr=kr * excited.pga_g * (1.0 + sign * off))
@@ -65,9 +65,9 @@ def test_energy_under_a_constant_drive_is_enclosed() -> None:
         stop = Place(0, arb(0.75))
         trajectory = block.integrate(Place(0, arb(0)), arb(0), arb(0), lifted=True, stop=stop)
         assert trajectory.theta > 0.05
-        kept = energy(trajectory.theta, trajectory.rate)
-        assert kept.overlaps(energy(arb(0), arb(0)))
-        assert kept.rad() < 1e-40
+        conserved = energy(trajectory.theta, trajectory.rate)
+        assert conserved.overlaps(energy(arb(0), arb(0)))
+        assert conserved.rad() < 1e-40
 
 
 @pytest.mark.parametrize("seed", range(2))
@@ -82,28 +82,28 @@ def test_outcomes_and_impacts_are_those_of_32_digits(seed: int, p2: float) -> No
         seen.add(proven.outcome)
         closer = enclose(excited, p2=p2, kr=kr, bits=(500,))
         assert len(closer.impacts_s) == len(proven.impacts_s)
-        for (one, width), (other, less) in zip(proven.impacts_s, closer.impacts_s, strict=True):
+        for (item, width), (other, less) in zip(proven.impacts_s, closer.impacts_s, strict=True):
             assert less < width < 1e-20
-            assert one == pytest.approx(other, abs=1e-15)
+            assert item == pytest.approx(other, abs=1e-15)
     assert seen
 
 
 def test_few_bits_say_nothing_rather_than_something_wrong() -> None:
     motion = GroundMotion(shaking(3, npts=500), 0.02)
     excited = excitation(motion)
-    found = critical(motion, p2=3.0)
-    assert found.lower is not None
-    assert found.upper is not None
-    said = [
+    result = critical(motion, p2=3.0)
+    assert result.lower is not None
+    assert result.upper is not None
+    outcomes = [
         enclose(excited, p2=3.0, kr=kr * excited.pga_g, bits=(bits,)).outcome
-        for kr in (found.lower, found.upper)
+        for kr in (result.lower, result.upper)
         for bits in (24, 32, 40, 64, 128)
     ]
-    assert set(said[:5]) <= {NOT_ENCLOSED, TOPPLED}
-    assert set(said[5:]) <= {NOT_ENCLOSED, STABLE}
-    assert NOT_ENCLOSED in said
-    assert said[4] == TOPPLED
-    assert said[9] == STABLE
+    assert set(outcomes[:5]) <= {NOT_ENCLOSED, TOPPLED}
+    assert set(outcomes[5:]) <= {NOT_ENCLOSED, STABLE}
+    assert NOT_ENCLOSED in outcomes
+    assert outcomes[4] == TOPPLED
+    assert outcomes[9] == STABLE
 
 
 def test_a_plateau_at_the_threshold_is_rest_and_an_ulp_above_is_motion() -> None:
@@ -145,7 +145,7 @@ def test_outside_the_model_is_rejected() -> None:
 
 
 def test_the_study_goes_on_where_it_was_ended(tmp_path: Path) -> None:
-    known = [
+    recordings_drawn = [
         Recording(f"made-{seed}", GroundMotion(shaking(seed, npts=300), 0.02), None)
         for seed in (1, 2)
     ]
@@ -155,30 +155,30 @@ def test_the_study_goes_on_where_it_was_ended(tmp_path: Path) -> None:
         GroundMotion(0.3 * shaking(5, npts=300), 0.02),
     )
     rows = tmp_path / "rows.csv"
-    first = brackets.study([*known, upright], 3, 1, rows, 60.0)
+    first = brackets.study([*recordings_drawn, upright], 3, 1, rows, 60.0)
     text = rows.read_text()
-    again = brackets.study([*known, upright], 5, 1, rows, 60.0)
+    again = brackets.study([*recordings_drawn, upright], 5, 1, rows, 60.0)
     assert again[:3] == first
     assert rows.read_text().startswith(text)
     assert all(row.off_proven and row.at_proven and row.above_proven for row in again)
     assert len({row.p2 for row in again}) == 5
-    table = tables.by_size(again)
+    table = brackets.by_size(again)
     assert "| all | 5, 1 | 5 | 5 | 5 |" in table
-    assert tables.by_combination(again).count("\n") == 6
+    assert brackets.by_combination(again).count("\n") == 6
 
 
 def test_no_proof_where_a_stronger_block_topples() -> None:
     motion = GroundMotion(shaking(3, npts=300), 0.02)
     excited = excitation(motion)
-    found = critical(motion, p2=3.0)
-    assert found.lower is not None
-    assert found.k_up_over_pga is not None
-    k_up = found.k_up_over_pga * excited.pga_g
+    result = critical(motion, p2=3.0)
+    assert result.lower is not None
+    assert result.k_up_over_pga is not None
+    k_up = result.k_up_over_pga * excited.pga_g
     for off in (1e-2, 1e-5):
-        kr = found.lower * excited.pga_g * (1.0 - off)
-        said = above.nothing_above(excited, p2=3.0, kr=kr, k_up=k_up, seconds=60.0)
-        assert not said.proven
-        assert said.reached >= found.lower * excited.pga_g
+        kr = result.lower * excited.pga_g * (1.0 - off)
+        verdict_above = above.nothing_above(excited, p2=3.0, kr=kr, k_up=k_up, seconds=60.0)
+        assert not verdict_above.proven
+        assert verdict_above.reached >= result.lower * excited.pga_g
     low = above.nothing_above(excited, p2=3.0, kr=kr, k_up=kr, seconds=60.0)
     assert "from rest" in low.reason
     assert not above.nothing_above(
@@ -191,8 +191,8 @@ def test_strong_shaking_both_ways_keeps_no_order() -> None:
     assert above.keeps_order(excitation(motion))
     motion = GroundMotion.from_nodes([0.0, 0.1, 0.2, 0.3], [0.0, 2.0, -0.501, 0.0])
     assert not above.keeps_order(excitation(motion))
-    said = above.nothing_above(excitation(motion), p2=3.0, kr=0.5, k_up=1.0, seconds=60.0)
-    assert "D >= 0" in said.reason
+    verdict_above = above.nothing_above(excitation(motion), p2=3.0, kr=0.5, k_up=1.0, seconds=60.0)
+    assert "D >= 0" in verdict_above.reason
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -212,33 +212,35 @@ def test_verdicts_hold_for_blocks_inside(seed: int) -> None:
             verdict = above.decide(record, exact(low), exact(high), table, 0).verdict
         seen.append(verdict)
         if verdict != above.SPLIT:
-            wanted = TOPPLED if verdict == above.TOPPLE else STABLE
+            expected = TOPPLED if verdict == above.TOPPLE else STABLE
             for kr in (low, *rng.uniform(low, high, 4)):
-                assert truth(excited, p2=p2, kr=float(kr)).outcome == wanted
+                assert truth(excited, p2=p2, kr=float(kr)).outcome == expected
     assert {above.SAFE, above.TOPPLE} <= set(seen)
 
 
 def test_a_block_on_the_wrong_side_is_no_proof() -> None:
-    one = Combination(Recording("pulse", PULSE, None), "forward", 5.0, False)
-    row = brackets.prove(one, 60.0)
+    combination = Combination(Recording("pulse", PULSE, None), "forward", 5.0, False)
+    row = brackets.prove(combination, 60.0)
     assert row is not None
     assert row.off_proven
-    found = critical(PULSE, p2=5.0)
-    assert found.upper is not None
-    wrong = enclose(one.excited(), p2=5.0, kr=found.upper * one.excited().pga_g * (1.0 + 1e-9))
+    result = critical(PULSE, p2=5.0)
+    assert result.upper is not None
+    wrong = enclose(
+        combination.excited(), p2=5.0, kr=result.upper * combination.excited().pga_g * (1.0 + 1e-9)
+    )
     assert wrong.outcome != TOPPLED
 
 
 def test_heyoka_agrees() -> None:
     pytest.importorskip("heyoka", reason="heyoka is in the extra bench")
     from benchmarks.proof.heyoka_runs import Oracle, compare
-    from rbfrag.bench.cases import Records, choose_cases
+    from rbfrag.bench.peers import Records, choose_cases
 
     motions = tuple(GroundMotion(shaking(seed, npts=500), 0.02) for seed in range(3))
     oracle = Oracle()
     for case in choose_cases(Records(motions, "made up"), 6, seed=2):
-        one = compare(oracle, case)
-        assert len(set(one.outcomes)) == 1
-        assert np.isnan(one.peak) or one.peak < 1e-10
-        assert not one.impact_s > 1e-9
-        assert not one.outside_s > 1e-9
+        difference = compare(oracle, case)
+        assert len(set(difference.outcomes)) == 1
+        assert np.isnan(difference.peak) or difference.peak < 1e-10
+        assert not difference.impact_s > 1e-9
+        assert not difference.outside_s > 1e-9

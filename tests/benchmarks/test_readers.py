@@ -22,17 +22,17 @@ PACKAGE = ROOT / "rbfrag"
 OPENING = frozenset({
     "open", "read_bytes", "read_text", "ParquetFile", "open_csv", "read_csv", "read_parquet",
     "read_dataframe", "load", "fromfile", "loadtxt", "genfromtxt", "ParseFile", "iterparse",
-    "source_text", "reading", "read_xml", "parse_xml", "csv_rows", "toml_document",
+    "source_text", "reading", "read_xml", "xml_events", "csv_rows", "toml_document",
     "json_document", "connect_sqlite",
 })  # fmt: skip
 """What opens a file, in Python, in the libraries that rbfrag uses, and in rbfrag itself."""
 
 NO_READERS = {
     "__init__.py:_home_of_names": "the package's own stub",
-    "cli/streams.py:end_unwritten": "opens what swallows output that cannot be written",
-    "campaign/machine.py:_processor": "the computer's own description",
-    "exchange/openquake/datastore.py:_opened": "HDF5's own library, which damaged bytes may hang",
-    "plots/coast.py:world": "the package's own coastline",
+    "cli/main.py:end_unwritten": "opens what swallows output that cannot be written",
+    "campaign/runner.py:_processor": "the computer's own description",
+    "exchange/openquake_tables.py:_opened": "HDF5's own library, which damaged bytes may hang",
+    "plots/shakemap.py:world": "the package's own coastline",
     "rockmasses/file.py:rock_mass_of_toml": "is given the text",
     "service/app.py:lifespan": "opens the pool of processes",
     "service/app.py:make_app": "its inner function opens the pool of processes",

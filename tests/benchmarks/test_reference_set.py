@@ -1,4 +1,4 @@
-"""What is shipped: no samples, sound, and still telling the outcome of a block."""
+"""The built-in data set: no samples, sound, and with the outcome of a block."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from sqlalchemy import select
 
 from benchmarks import reference_set
 from rbfrag.db import schema
+from rbfrag.db.campaigns import spectrum_values
 from rbfrag.db.engine import opened_database
 from rbfrag.db.queries import combination_table, outcome_grid
-from rbfrag.db.spectra import spectrum_values
 from rbfrag.motions.readers import read_motions
 from rbfrag.solver.toppling_run import respond
 from tests.synthetic import shaking, write_at2
@@ -67,11 +67,11 @@ def test_it_needs_no_journal_and_holds_no_samples(built: Path) -> None:
     settings = raw.execute(
         "SELECT DISTINCT settings FROM combination WHERE kind = 'toppling'"
     ).fetchall()
-    others = raw.execute("SELECT kind, count(*) FROM combination GROUP BY kind").fetchall()
+    rows = raw.execute("SELECT kind, count(*) FROM combination GROUP BY kind").fetchall()
     curves = raw.execute("SELECT count(displacement_m) FROM simulation").fetchone()
     maps = raw.execute("SELECT count(*) FROM outcome_interval").fetchone()
     raw.close()
-    assert dict(others) == {"sliding": 4, "toppling": 36}
+    assert dict(rows) == {"sliding": 4, "toppling": 36}
     assert curves == (4 * 23,)
     assert maps == (0,)
     assert settings == [('{"search_limit":0.01}',)]
@@ -91,19 +91,19 @@ def test_every_outcome_that_fits_read_is_in_it(built: Path) -> None:
     with opened_database(built / "reference-full.db", read_only=True) as full:  # noqa: SIM117
         with full.connect() as connection:
             all_of_it = combination_table(connection, vertical="without")
-            whole = outcome_grid(connection, all_of_it.combination_id)
+            complete = outcome_grid(connection, all_of_it.combination_id)
     assert np.array_equal(all_of_it.natural_key, table.natural_key)
-    kr = whole.k_over_pga * table.pga_g[:, None]
+    kr = complete.k_over_pga * table.pga_g[:, None]
     read = kr >= 0.02
     read[:, -1] = True  # above the strongest all are safe
     assert 0 < (~read).sum() < read.sum()
     assert np.array_equal(np.isfinite(grid.outcome), read)
-    assert np.array_equal(grid.outcome[read], whole.outcome[read])
+    assert np.array_equal(grid.outcome[read], complete.outcome[read])
     motions = {m.pga_g: m for f in built.glob("*/*.AT2") for m in read_motions(f)}
     for i in range(0, 24, 5):
         motion = motions[table.pga_g[i]]
-        kept = read[i]
-        for k, fails in zip(grid.k_over_pga[i][kept], grid.outcome[i][kept], strict=True):
+        record = read[i]
+        for k, fails in zip(grid.k_over_pga[i][record], grid.outcome[i][record], strict=True):
             run = respond(motion, p2=table.p2[i], kr=k * motion.pga_g, polarity=table.polarity[i])
             assert (run.outcome == "toppled") == bool(fails)
 

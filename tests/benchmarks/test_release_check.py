@@ -1,4 +1,4 @@
-"""What the check of a release compares: versions stated in three files, lists of files."""
+"""Comparisons of the check of a release: versions in three files, lists of files."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from benchmarks.release_check import SHIPPED, differing, shipped_component, vers
 from tests.conftest import ROOT
 
 
-def stated(root: Path, *, package: str, cited: str, heading: str) -> Path:
+def write_versions(root: Path, *, package: str, cited: str, heading: str) -> Path:
     (root / "rbfrag").mkdir()
     (root / "rbfrag/version.py").write_text(f'__version__ = "{package}"\n')
     (root / "CITATION.cff").write_text(f"cff-version: 1.2.0\nversion: {cited}\n")
@@ -19,7 +19,9 @@ def stated(root: Path, *, package: str, cited: str, heading: str) -> Path:
 
 
 def test_versions_that_agree(tmp_path: Path) -> None:
-    root = stated(tmp_path, package="0.1.0", cited="0.1.0", heading="## [0.1.0] - 2026-11-23")
+    root = write_versions(
+        tmp_path, package="0.1.0", cited="0.1.0", heading="## [0.1.0] - 2026-11-23"
+    )
     assert versions_agree(root) == "0.1.0"
 
 
@@ -33,7 +35,7 @@ def test_versions_that_agree(tmp_path: Path) -> None:
     ],
 )
 def test_versions_that_differ(tmp_path: Path, cited: str, heading: str, reason: str) -> None:
-    root = stated(tmp_path, package="0.1.0", cited=cited, heading=heading)
+    root = write_versions(tmp_path, package="0.1.0", cited=cited, heading=heading)
     with pytest.raises(RuntimeError, match=reason):
         versions_agree(root)
 
@@ -44,7 +46,7 @@ def test_files_too_many_and_too_few() -> None:
 
 
 def test_a_shipped_library_is_in_the_bill_of_materials() -> None:
-    found = shipped_component(ROOT / SHIPPED)
-    assert found["name"] == "d3"
-    assert found["purl"] == f"pkg:npm/d3@{found['version']}"
-    assert f"| D3 {found['version']} |" in (ROOT / "docs/dependencies.md").read_text("utf-8")
+    result = shipped_component(ROOT / SHIPPED)
+    assert result["name"] == "d3"
+    assert result["purl"] == f"pkg:npm/d3@{result['version']}"
+    assert f"| D3 {result['version']} |" in (ROOT / "docs/dependencies.md").read_text("utf-8")

@@ -1,4 +1,4 @@
-"""What `wrk` prints is read, and ratios are of pairs."""
+"""Output of `wrk`, and ratios of pairs."""
 
 from __future__ import annotations
 
@@ -42,8 +42,8 @@ def test_what_wrk_prints(monkeypatch: pytest.MonkeyPatch, trouble: str, bad: int
 
 
 def test_what_wrk_does_not_print_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
-    done = subprocess.CompletedProcess([], 0, "something else", "")
-    monkeypatch.setattr(subprocess, "run", lambda *_, **__: done)
+    process = subprocess.CompletedProcess([], 0, "something else", "")
+    monkeypatch.setattr(subprocess, "run", lambda *_, **__: process)
     with pytest.raises(SystemExit, match="something else"):
         service_load.wrk("http://127.0.0.1:8000/", 10, 16)
 

@@ -85,7 +85,7 @@ def test_tables_come_out_and_outcomes_are_kept(
         "(f) share",
         "(g) shipped",
     ):
-        (line,) = [one for one in first.out.splitlines() if one.startswith(f"| {name}")][:1]
+        (line,) = [line for line in first.out.splitlines() if line.startswith(f"| {name}")][:1]
         assert line.count("±") == 6
         assert "nan" not in line
     assert "(missed)" in first.out
@@ -102,19 +102,19 @@ def test_tables_come_out_and_outcomes_are_kept(
 def test_the_shipped_fragility_is_asked_for_each_block(folder: Path) -> None:
     trials = read(folder)
     row = next(row for row in shipped_models() if row.term == "pgv_pga")
-    made = shipped_fragility(trials, row, [0.75, None])
+    probabilities = shipped_fragility(trials, row, [0.75, None])
     number, test = MEDIAN_RAD.size + 7, 5
-    assert made.p.shape == (2 * MEDIAN_RAD.size, len(trials.motions))
+    assert probabilities.p.shape == (2 * MEDIAN_RAD.size, len(trials.motions))
     motion, alpha = trials.motions[test], MEDIAN_RAD[7]
     for k, e in ((7, 0.75), (number, None)):
-        assert made.settings[k][0] == alpha
+        assert probabilities.settings[k][0] == alpha
         answer = rbfrag.predict(
             kind="rocking", p2=P2, kr=math.tan(alpha), restitution=e,
             pgv_m_s=motion.pgv_m_s, pga_g=motion.pga_g, model=row,
         )  # fmt: skip
-        assert made.p[k, test] == pytest.approx(answer.probability, rel=1e-12)
-    assert made.settings[7][2] == 0.75
-    assert math.isnan(made.settings[number][2])
+        assert probabilities.p[k, test] == pytest.approx(answer.probability, rel=1e-12)
+    assert probabilities.settings[7][2] == 0.75
+    assert math.isnan(probabilities.settings[number][2])
 
 
 def test_files_are_read_as_they_say(folder: Path, tmp_path: Path) -> None:
@@ -209,9 +209,12 @@ def test_logistic_regression_meets_its_score_equations() -> None:
 
 def test_shares_are_those_of_the_distribution() -> None:
     shape = (1, 3, ALPHA_RAD.size, RESTITUTION.size)
-    free = np.zeros(shape)
-    free[:, 0], free[:, 1] = 1.0, 1.0  # even blocks fall, uneven ones of one sense
-    assert distributions(free).p == pytest.approx(0.01 + 0.98 * 0.75, rel=1e-12)
+    free_standing = np.zeros(shape)
+    free_standing[:, 0], free_standing[:, 1] = (
+        1.0,
+        1.0,
+    )  # even blocks fall, uneven ones of one sense
+    assert distributions(free_standing).p == pytest.approx(0.01 + 0.98 * 0.75, rel=1e-12)
     slender = np.zeros(shape)
     slender[0, :, :9, 1] = 1.0
     result = distributions(slender)
@@ -229,15 +232,15 @@ def test_shares_are_those_of_the_distribution() -> None:
 def test_blocks_are_those_of_respond(folder: Path) -> None:
     motion = read(folder).motions[2]
     codes, backed = run_blocks(motion.acceleration_g)
-    free = overturned(codes)
-    assert 0.0 < free[0].mean() < 1.0
+    free_standing = overturned(codes)
+    assert 0.0 < free_standing[0].mean() < 1.0
     for i in range(0, ALPHA_RAD.size, 3):
         kr = math.tan(ALPHA_RAD[i])
         for j in (0, 3):
             answer = rbfrag.respond(
                 motion, kind="rocking", p2=P2, kr=kr, restitution=RESTITUTION[j]
             )
-            assert (answer.outcome == "toppled") == (free[0, i, j] == 1.0)
+            assert (answer.outcome == "toppled") == (free_standing[0, i, j] == 1.0)
         for k, way in enumerate(("forward", "reverse")):
             answer = rbfrag.respond(motion, kind="toppling", p2=P2, kr=kr, polarity=way)
             assert (answer.outcome == "toppled") == (overturned(backed)[k, i] == 1.0)
@@ -250,23 +253,25 @@ def test_measured_overturns_go_with_the_simulated_share(shaketable_dir: Path) ->
     trials = read(shaketable_dir)
     assert (len(trials.motions), np.unique(trials.base).size) == (250, 30)
     assert trials.overturned.mean(axis=1) == pytest.approx([0.416, 0.344], abs=1e-9)
-    some = np.arange(0, 250, 25)
-    free = overturned(np.array([run_blocks(trials.motions[k].acceleration_g)[0] for k in some]))
+    indices = np.arange(0, 250, 25)
+    free_standing = overturned(
+        np.array([run_blocks(trials.motions[k].acceleration_g)[0] for k in indices])
+    )
     # one distribution for both specimens, beside the base rate's Brier score of .24 and .23
-    share = distributions(free)
+    share = distributions(free_standing)
     median = MEDIAN_RAD[np.abs(np.log(MEDIAN_RAD / 0.075)).argmin()]
     chosen = np.flatnonzero(np.isclose(share.settings, (median, 0.2, 0.92)).all(axis=1))
-    for failed in trials.overturned[:, some]:
+    for failed in trials.overturned[:, indices]:
         assert ((share.p[chosen[0]] - failed) ** 2).mean() < 0.12
 
 
 def test_the_filter_passes_the_band_and_shifts_nothing() -> None:
     time = np.arange(0.0, 40.0, 1.0 / 200.0)
     inside = np.sin(2 * np.pi * 3.0 * time)
-    kept = simulated.filtered(inside)
+    passed = simulated.filtered(inside)
     middle = slice(1000, 3000)
-    assert isinstance(kept, GroundMotion)
-    assert kept.acceleration_g[middle] == pytest.approx(inside[::2][middle], abs=1e-3)
+    assert isinstance(passed, GroundMotion)
+    assert passed.acceleration_g[middle] == pytest.approx(inside[::2][middle], abs=1e-3)
     for outside_hz in (0.05, 80.0):
         outside = simulated.filtered(np.sin(2 * np.pi * outside_hz * time))
         assert np.abs(outside.acceleration_g[middle]).max() < 0.02

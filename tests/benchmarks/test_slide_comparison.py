@@ -7,8 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from benchmarks.published_slides import PUBLISHED, Published
 from benchmarks.slide_comparison import (
+    PUBLISHED,
+    Published,
     Scored,
     Slides,
     clustered_mean,
@@ -94,27 +95,29 @@ def test_the_error_of_a_mean_is_that_of_whole_earthquakes() -> None:
 
 
 def test_the_larger_of_two_polarities_is_one_row_a_motion() -> None:
-    one = drawn("sliding", "pgv_pga", 40)
-    assert one.displacement_m is not None
+    source_drawn = drawn("sliding", "pgv_pga", 40)
+    assert source_drawn.displacement_m is not None
     back = replace(
-        one,
-        table=replace(one.table, polarity=np.full(40, "reverse", dtype=object)),
-        displacement_m=one.displacement_m[::-1],
+        source_drawn,
+        table=replace(source_drawn.table, polarity=np.full(40, "reverse", dtype=object)),
+        displacement_m=source_drawn.displacement_m[::-1],
     )
     order = np.random.default_rng(1).permutation(80)
-    twice = one.table.only(np.tile(np.arange(40), 2))
-    polarity = np.concatenate([one.table.polarity, back.table.polarity])
+    twice = source_drawn.table.only(np.tile(np.arange(40), 2))
+    polarity = np.concatenate([source_drawn.table.polarity, back.table.polarity])
     both = replace(
-        one,
+        source_drawn,
         table=replace(twice, polarity=polarity),
-        xp_m_s=np.tile(one.xp_m_s, 2),
-        k_over_pga=np.tile(one.k_over_pga, (2, 1)),
-        failed=np.tile(one.failed, (2, 1)),
-        displacement_m=np.concatenate([one.displacement_m, one.displacement_m[::-1]]),
+        xp_m_s=np.tile(source_drawn.xp_m_s, 2),
+        k_over_pga=np.tile(source_drawn.k_over_pga, (2, 1)),
+        failed=np.tile(source_drawn.failed, (2, 1)),
+        displacement_m=np.concatenate(
+            [source_drawn.displacement_m, source_drawn.displacement_m[::-1]]
+        ),
     ).only(order)
     larger = larger_of_two(both)
     assert larger.displacement_m is not None
     sorted_rows = np.argsort(larger.table.motion_id)
-    further = np.maximum(one.displacement_m, one.displacement_m[::-1])
+    further = np.maximum(source_drawn.displacement_m, source_drawn.displacement_m[::-1])
     assert np.array_equal(larger.displacement_m[sorted_rows], further)
     assert set(larger.table.polarity) == {"forward"}

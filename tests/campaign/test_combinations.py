@@ -1,4 +1,4 @@
-"""What a campaign is made of: components x vertical x polarity x p², grids, histories."""
+"""Combinations of a campaign: components x vertical x polarity x p², grids, histories."""
 
 from __future__ import annotations
 
@@ -10,16 +10,16 @@ import numpy as np
 import pytest
 from sqlalchemy import select, update
 
+from rbfrag.campaign.database_check import resimulate
 from rbfrag.campaign.plan import strengths_of
-from rbfrag.campaign.resimulate import resimulate
 from rbfrag.campaign.simulate import simulate
 from rbfrag.db import schema
-from rbfrag.db.check.database import check_database
+from rbfrag.db.campaigns import stored_combination
+from rbfrag.db.check import check_database
 from rbfrag.db.engine import opened_database
 from rbfrag.db.motions import add_motion, load_motion, motion_rows
 from rbfrag.db.queries import combination_table
 from rbfrag.db.rows import EarthquakeInfo
-from rbfrag.db.stored_combination import stored_combination
 from rbfrag.errors import InputError
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.solver.search.critical import critical
@@ -69,16 +69,16 @@ class TestVertical:
         for row in rows:
             motion, up = motions[row["motion_id"]], motions[row["vertical_motion_id"]]
             assert (motion.station, up.component) == (up.station, "UP")
-            told = critical(motion, p2=3.0, vertical=up, polarity=row["polarity"])
-            assert row["kr_over_pga"] == told.kr_over_pga
+            document = critical(motion, p2=3.0, vertical=up, polarity=row["polarity"])
+            assert row["kr_over_pga"] == document.kr_over_pga
             short = "450 samples" in row["warnings"]
             assert short == (up.npts == 450)
 
     def test_verticals_need_not_be_in_the_suite(self, three_component_database: Path) -> None:
-        told = simulate(
+        document = simulate(
             three_component_database, suite="horizontals", p2=(3.0,), vertical="with", jobs=1
         )
-        assert told.combinations == 8
+        assert document.combinations == 8
 
     def test_what_throws_the_block_is_outside_the_model(
         self, three_component_database: Path
@@ -92,8 +92,8 @@ class TestVertical:
                 connection, GroundMotion(thrown, 0.02), earthquake=quake, is_vertical=True,
                 recording="c", station="c",
             )  # fmt: skip
-        told = simulate(database, p2=P2, vertical="with", grid=[0.5], jobs=1)
-        assert (told.outside_model, told.without_vertical) == (4, 0)
+        document = simulate(database, p2=P2, vertical="with", grid=[0.5], jobs=1)
+        assert (document.outside_model, document.without_vertical) == (4, 0)
         (row,) = {
             (row["kr_over_pga"], row["certified"])
             for row in _combinations(database)
@@ -131,8 +131,8 @@ class TestGrid:
 
     def test_its_runs_are_stored(self, three_component_database: Path) -> None:
         database = three_component_database
-        told = simulate(database, p2=(3.0,), vertical="both", grid=7, jobs=1)
-        assert told.grid_runs == 7 * told.combinations
+        document = simulate(database, p2=(3.0,), vertical="both", grid=7, jobs=1)
+        assert document.grid_runs == 7 * document.combinations
         with opened_database(database, read_only=True) as engine, engine.connect() as connection:
             table = combination_table(connection)
             motion = load_motion(connection, int(table.motion_id[0]))
@@ -165,10 +165,10 @@ class TestHistories:
     ) -> None:
         database = three_component_database
         later = copy_of(database, "later.db")
-        told = simulate(
+        document = simulate(
             database, p2=(3.0,), vertical="both", store_responses=[0.3, "critical"], jobs=1
         )
-        assert told.responses == told.combinations + told.found
+        assert document.responses == document.combinations + document.found
         simulate(later, p2=(3.0,), vertical="both", jobs=1)
         simulate(later, p2=(3.0,), vertical="both", store_responses=["critical"], jobs=2)
         last = simulate(later, p2=(3.0,), vertical="both", store_responses=[0.3], jobs=1)
@@ -188,7 +188,7 @@ class TestHistories:
             critical_values = {row["kr"] for row in _combinations(database)}
             assert {row["kr"] for row in rows} == critical_values - {None}
             row = rows[0]
-            told = respond(
+            document = respond(
                 load_motion(connection, row["motion_id"]),
                 vertical=load_motion(connection, row["vertical_motion_id"]),
                 p2=3.0,
@@ -196,8 +196,8 @@ class TestHistories:
                 polarity=row["polarity"],
                 history=True,
             )
-        assert row["outcome"] == told.outcome == "toppled"
-        assert told.history is not None
+        assert row["outcome"] == document.outcome == "toppled"
+        assert document.history is not None
         for name in ("time_s", "theta_rad", "theta_dot_rad_s", "k_h", "k_v"):
             stored = np.frombuffer(row[name], dtype="<f8")
-            np.testing.assert_array_equal(stored, getattr(told.history, name))
+            np.testing.assert_array_equal(stored, getattr(document.history, name))

@@ -13,31 +13,31 @@ import pytest
 from sqlalchemy import Engine, select, update
 
 from benchmarks.database_content import table_rows_by_natural_key
+from rbfrag.campaign.database_check import resimulate
 from rbfrag.campaign.kind import CaseRequest
 from rbfrag.campaign.kinds.slumping import CAMPAIGN, FAMILY
-from rbfrag.campaign.resimulate import resimulate
 from rbfrag.campaign.scaled_records import BlockClass, ScaledRecords
 from rbfrag.campaign.simulate import CampaignProgress, CampaignSummary, simulate
 from rbfrag.db import schema
-from rbfrag.db.check.database import check_database
+from rbfrag.db.check import check_database
 from rbfrag.db.engine import open_database, opened_database
-from rbfrag.db.merge.databases import merge_databases
+from rbfrag.db.merge import merge_databases
 from rbfrag.db.models import model_rows, save_model
 from rbfrag.db.motions import add_motion, load_motion
 from rbfrag.db.queries import combination_table, outcome_grid
 from rbfrag.db.rows import EarthquakeInfo
 from rbfrag.errors import InputError, UnknownModelError
 from rbfrag.exchange.database_tables import export_database
-from rbfrag.fragility.fit.check import check_models
 from rbfrag.fragility.fit.fitting import fit
+from rbfrag.fragility.fit.stored import check_models
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.question.question import predict
 from rbfrag.solver.critical import critical
 from rbfrag.solver.kind import Shaking
-from rbfrag.solver.mechanism import shaken_mechanism
 from rbfrag.solver.models import model_of_kind
 from rbfrag.solver.models.sliding import KY_OVER_PGA, sliding_displacements
 from rbfrag.solver.respond import respond
+from rbfrag.solver.simulation import shaken_mechanism
 from tests.synthetic import shaking
 
 TWO = (FAMILY[0], FAMILY[2])
@@ -75,9 +75,9 @@ def findings(engine: Engine) -> list[Any]:
 
 def test_every_block_of_the_family_slumps_and_is_stable_at_rest() -> None:
     assert len(FAMILY) == len(set(FAMILY)) == 18
-    for each in FAMILY:
+    for item in FAMILY:
         shaken = shaken_mechanism(
-            model_of_kind("slumping"), each.block, beta_deg=each.beta_deg, phi_deg=each.phi_deg
+            model_of_kind("slumping"), item.block, beta_deg=item.beta_deg, phi_deg=item.phi_deg
         )
         assert 0.05 < shaken.yield_g < 1.0
         assert shaken.p2 > 0.0
@@ -151,8 +151,8 @@ def test_slides_are_stored_with_their_displacements(place: str) -> None:
                     .where(schema.simulation.c.combination_id == row["id"])
                     .order_by(schema.simulation.c.kr_over_pga)
                 ).all()
-            found = critical(motion, displacement_m=distance, polarity=row["polarity"])
-            assert (row["kr_over_pga"], row["status"]) == (found.kr_over_pga, found.status)
+            result = critical(motion, displacement_m=distance, polarity=row["polarity"])
+            assert (row["kr_over_pga"], row["status"]) == (result.kr_over_pga, result.status)
             assert (row["p2"], row["y_m_s"]) == (None, None)
             if distance == 0.0:
                 assert [point.kr_over_pga for point in points] == list(KY_OVER_PGA)
@@ -211,12 +211,12 @@ def test_toppling_rows_do_not_notice(database: Path) -> None:
 def test_tables_of_one_rotation_hold_each_block_once(database: Path) -> None:
     slump(database)
     with opened_database(database, read_only=True) as engine, engine.connect() as connection:
-        one = combination_table(connection, kind="slumping", rotation_deg=1.0)
+        single = combination_table(connection, kind="slumping", rotation_deg=1.0)
         recovery = combination_table(connection, kind="slumping")
         none = combination_table(connection, kind="slumping", rotation_deg=7.0)
-        grids = [outcome_grid(connection, table.combination_id) for table in (one, recovery)]
+        grids = [outcome_grid(connection, table.combination_id) for table in (single, recovery)]
         assert combination_table(connection).p2.size == 0
-    assert one.p2.size == recovery.p2.size == 2 * 2 * len(TWO)
+    assert single.p2.size == recovery.p2.size == 2 * 2 * len(TWO)
     assert none.p2.size == 0
     # the keys sort differently: compare how many fail
     failed = [int((grid.outcome == 1.0).sum()) for grid in grids]
@@ -239,10 +239,10 @@ def test_damage_is_found(database: Path) -> None:
             connection.execute(
                 update(table).where(table.c.kr_over_pga == 0.2).values(displacement_m=99.0)
             )
-        assert any("further than" in each.problem for each in findings(engine))
+        assert any("further than" in item.problem for item in findings(engine))
         with engine.connect() as connection:
             again = resimulate(connection, sample=100)
-        assert any("computed again" in each.problem for each in again.findings)
+        assert any("computed again" in item.problem for item in again.findings)
 
 
 def test_what_two_databases_found_is_merged_and_exported(

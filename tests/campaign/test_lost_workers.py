@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rbfrag.cli.commands.simulate import WorkerOptions
+from rbfrag.cli.options import runner
 from rbfrag.exchange.event_losses import losses
 from rbfrag.hazards.curve import HazardCurve
 from rbfrag.hazards.event_counts import count_years
@@ -36,7 +36,7 @@ def deadly() -> Iterator[Deadly]:
             victim = next(iter(client.run(os.getpid).values()))
 
         def of(work: Callable[..., Any]) -> Callable[..., Iterator[Any]]:
-            run = WorkerOptions(scheduler=cluster.scheduler_address).runner(work)
+            run = runner(work, None, cluster.scheduler_address)
 
             def killing(parts: Iterator[Any], number: int, *shared: Any) -> Iterator[Any]:
                 assert number > 10
@@ -63,8 +63,8 @@ def test_losses_are_those_of_one_process(
     other = losses(folder, blocks, samples=20, component="rotd50", run=deadly(count_years))
     assert other.failures == pytest.approx(alone.failures, rel=1e-12)
     assert other.any_fails == pytest.approx(alone.any_fails, rel=1e-12)
-    for one, same in zip(alone.exceedance.values(), other.exceedance.values(), strict=True):
-        rates = [row.annual_rate for row in one]
+    for value, same in zip(alone.exceedance.values(), other.exceedance.values(), strict=True):
+        rates = [row.annual_rate for row in value]
         assert [row.annual_rate for row in same] == pytest.approx(rates, rel=1e-12)
 
 
@@ -74,7 +74,7 @@ def test_rates_are_those_of_one_process(deadly: Deadly, monkeypatch: pytest.Monk
     curve = HazardCurve("pgv_m_s", levels, 0.001 * levels**-2.0)
     blocks = np.geomspace(1.0, 30.0, 400), np.linspace(0.05, 0.5, 400)
     alone = hazard(curve, *blocks, component="rotd50")
-    for run in (deadly(rate_part), WorkerOptions(jobs=2).runner(rate_part)):
+    for run in (deadly(rate_part), runner(rate_part, 2, None)):
         other = hazard(curve, *blocks, component="rotd50", run=run)
         for name in ("annual_rate", "ci_low", "ci_high"):
             assert getattr(other, name) == pytest.approx(getattr(alone, name), rel=1e-12)

@@ -12,15 +12,15 @@ import numpy as np
 import pytest
 from sqlalchemy import select, update
 
-import rbfrag.campaign.resimulate
+import rbfrag.campaign.database_check
+from rbfrag.campaign.database_check import resimulate
 from rbfrag.campaign.kinds.rocking import Y_OVER_PGV
-from rbfrag.campaign.resimulate import resimulate
 from rbfrag.campaign.simulate import CampaignProgress, CampaignSummary, simulate
 from rbfrag.db import schema
-from rbfrag.db.check.database import check_database
+from rbfrag.db.check import check_database
 from rbfrag.db.engine import opened_database
 from rbfrag.db.insert import update_rows
-from rbfrag.db.merge.databases import merge_databases
+from rbfrag.db.merge import merge_databases
 from rbfrag.db.motions import add_motion, load_motion
 from rbfrag.db.queries import combination_table, outcome_grid
 from rbfrag.db.rows import EarthquakeInfo
@@ -47,8 +47,8 @@ def fill(place: str | Path, count: int = 2) -> None:
 
 
 def run(place: str | Path, **more: Any) -> CampaignSummary:
-    given = {"p2": P2, "restitution_factors": FACTORS, "jobs": 1, **more}
-    return simulate(place, kind=KIND, **given)
+    inputs = {"p2": P2, "restitution_factors": FACTORS, "jobs": 1, **more}
+    return simulate(place, kind=KIND, **inputs)
 
 
 @pytest.fixture(scope="module")
@@ -132,7 +132,7 @@ def test_an_interrupted_campaign_goes_on_where_it_stopped(
 
 
 @pytest.mark.parametrize(
-    ("asked", "words"),
+    ("inputs", "words"),
     [
         ({"restitution_factors": ()}, "the list is empty"),
         ({"restitution_factors": (1.0, 1.0)}, "1 is in the list twice"),
@@ -144,9 +144,9 @@ def test_an_interrupted_campaign_goes_on_where_it_stopped(
         ({"grid": 5}, "grid requires kind toppling"),
     ],
 )
-def test_what_cannot_be_run_is_rejected(database: Path, asked: dict[str, Any], words: str) -> None:
+def test_what_cannot_be_run_is_rejected(database: Path, inputs: dict[str, Any], words: str) -> None:
     with pytest.raises(InputError, match=words):
-        run(database, **asked)
+        run(database, **inputs)
     with pytest.raises(InputError, match="restitution_factors requires kind rocking"):
         simulate(database, restitution_factors=FACTORS)
 
@@ -156,8 +156,8 @@ def test_what_is_stored_is_computed_again_bit_for_bit(
 ) -> None:
     def again() -> tuple[int, int, list[str]]:
         with opened_database(database, read_only=True) as engine, engine.connect() as connection:
-            found = resimulate(connection, sample=100)
-        return found.exact, found.within_error, [each.problem for each in found.findings]
+            result = resimulate(connection, sample=100)
+        return result.exact, result.within_error, [finding.problem for finding in result.findings]
 
     assert again() == (8, 0, [])
     point = schema.simulation.c
@@ -171,7 +171,7 @@ def test_what_is_stored_is_computed_again_bit_for_bit(
     assert len(problems) == 1
     assert "sensitive" in problems[0]
     # on another machine the flag may be another one, and with it the outcome
-    module = rbfrag.campaign.resimulate
+    module = rbfrag.campaign.database_check
     monkeypatch.setattr(module, "processor_and_compiler", lambda: "another machine")
     assert again() == (7, 1, [])
     with opened_database(database) as engine, engine.begin() as connection:

@@ -12,21 +12,20 @@ from typing import Any
 import pytest
 from sqlalchemy import Engine, select, update
 
+from rbfrag.campaign.database_check import resimulate
 from rbfrag.campaign.kinds.slumping import FAMILY, BlockClass
-from rbfrag.campaign.motion_pairs import MotionPair, drawn_pairs, shocks_of_stations
-from rbfrag.campaign.resimulate import resimulate
+from rbfrag.campaign.sequences import MotionPair, drawn_pairs, shocks_of_stations
 from rbfrag.campaign.simulate import CampaignProgress, CampaignSummary, simulate
 from rbfrag.db import schema
-from rbfrag.db.check.database import check_database
+from rbfrag.db.check import check_database
 from rbfrag.db.engine import open_database, opened_database
 from rbfrag.db.insert import renew_digests
-from rbfrag.db.merge.databases import merge_databases
+from rbfrag.db.merge import merge_databases
 from rbfrag.db.motions import add_motion, load_motion, motion_rows
 from rbfrag.db.rows import EarthquakeInfo, MotionRow
 from rbfrag.errors import InputError, MergeConflictError, StoppedError
 from rbfrag.motions.ground_motion import GroundMotion
-from rbfrag.solver.respond import respond
-from rbfrag.solver.sequence import STARTS_ANEW
+from rbfrag.solver.respond import STARTS_ANEW, respond
 from tests.synthetic import shaking
 
 TWO = (FAMILY[0], FAMILY[8])
@@ -57,8 +56,8 @@ def database(tmp_path: Path) -> Path:
 
 
 def run(place: str | Path, kind: str = "sliding", **more: Any) -> CampaignSummary:
-    own = {"family": TWO, "rotations_deg": (1.0, None)} if kind == "slumping" else {}
-    return simulate(place, kind=kind, sequence=True, **{"jobs": 1, **own, **more})
+    block_inputs = {"family": TWO, "rotations_deg": (1.0, None)} if kind == "slumping" else {}
+    return simulate(place, kind=kind, sequence=True, **{"jobs": 1, **block_inputs, **more})
 
 
 def stored(engine: Engine) -> list[Any]:
@@ -107,9 +106,9 @@ def test_slumps_are_those_of_a_sequence_of_two_motions(place: str) -> None:
             with engine.connect() as connection:
                 first = load_motion(connection, row["first_motion_id"])
                 second = load_motion(connection, row["second_motion_id"])
-            each = BlockClass(**json.loads(row["block"]))
-            planes: dict[str, Any] = {"beta_deg": each.beta_deg, "phi_deg": each.phi_deg}
-            planes |= {"block": each.block, "polarity": row["polarity"]}
+            separate = BlockClass(**json.loads(row["block"]))
+            planes: dict[str, Any] = {"beta_deg": separate.beta_deg, "phi_deg": separate.phi_deg}
+            planes |= {"block": separate.block, "polarity": row["polarity"]}
             both, alone = respond([first, second], **planes), respond(second, **planes)
             assert row["intact_peak_rad"] == alone.peak_theta_rad
             assert row["first_outcome"] == both.parts[0].response.outcome
@@ -144,13 +143,13 @@ def test_a_campaign_that_was_stopped_goes_on_where_it_stopped(
     database: Path, copy_of: Callable[[Path, str], Path], digest_of: Callable[[Path], str]
 ) -> None:
     other = copy_of(database, "other.db")
-    whole = run(other)
+    complete = run(other)
     seen: list[CampaignProgress] = []
     with pytest.raises(StoppedError, match="8 of 32 stored; the same command goes on"):
         run(database, on_progress=seen.append, stopped=lambda: seen[-1].completed > 0)
     again = run(database)
     assert (again.resumed, again.combinations) == (8, 32)
-    assert again.sequence == whole.sequence
+    assert again.sequence == complete.sequence
     assert digest_of(database) == digest_of(other)
     assert (run(database).runs, run(database).resumed) == (0, 32)
 
@@ -202,8 +201,8 @@ def test_damage_is_found(database: Path, values: dict[str, str], problem: str) -
     with opened_database(database) as engine, engine.begin() as connection:
         first = schema.shock_pair.c.id == 1
         connection.execute(update(schema.shock_pair).where(first).values(**values))
-        problems = [each.problem for each in check_database(connection)]
-    assert any(problem in each for each in problems)
+        problems = [item.problem for item in check_database(connection)]
+    assert any(problem in item for item in problems)
 
 
 @pytest.mark.parametrize(
@@ -251,8 +250,8 @@ def test_shocks_of_a_station_follow_one_another_in_time(database: Path) -> None:
     in_time = [("shock-10", "shock-1"), ("shock-1", "shock-2")]
     assert _events(shocks_of_stations(rows, dated)) == in_time
     clocks = {"shock-1": "14:52", "shock-2": "14:42", "shock-10": "14:29", "other": None}
-    told = [replace(row, start_time=clocks[row.event_id]) for row in rows]
-    assert _events(shocks_of_stations(told, year)) == [
+    document = [replace(row, start_time=clocks[row.event_id]) for row in rows]
+    assert _events(shocks_of_stations(document, year)) == [
         ("shock-10", "shock-2"),
         ("shock-2", "shock-1"),
     ]
@@ -278,8 +277,8 @@ def test_draws_depend_on_samples_and_seed_alone(database: Path) -> None:
     key = {(pair.first.sha256, pair.second.sha256) for pair in pairs}
     backward = drawn_pairs(rows[::-1], set(), 1, 2)
     assert {(pair.first.sha256, pair.second.sha256) for pair in backward} == key
-    assert all(one != other for one, other in _events(pairs))
+    assert all(item != other for item, other in _events(pairs))
     # a motion that is not there changes only the pairs that it is drawn for
     fewer = drawn_pairs(rows[:-1], set(), 1, 2)
-    kept = {(one, other) for one, other in _events(pairs) if "other" not in (one, other)}
-    assert kept <= set(_events(fewer))
+    retained = {(item, other) for item, other in _events(pairs) if "other" not in (item, other)}
+    assert retained <= set(_events(fewer))

@@ -18,12 +18,11 @@ from rbfrag.campaign.add_motions import add_motions
 from rbfrag.campaign.kind import Case
 from rbfrag.campaign.kinds import campaign_of_kind
 from rbfrag.campaign.simulate import CampaignProgress, simulate
+from rbfrag.db.campaigns import intervals_of, spectrum_values
 from rbfrag.db.engine import opened_database
 from rbfrag.db.motions import load_motion
 from rbfrag.db.queries import combination_table, database_info, outcome_grid
 from rbfrag.db.schema import combination, outcome_interval, simulation
-from rbfrag.db.spectra import spectrum_values
-from rbfrag.db.stored_combination import intervals_of
 from rbfrag.errors import InputError, WorkFailedError
 from rbfrag.solver.toppling_run import respond
 from tests.synthetic import write_suite
@@ -56,10 +55,14 @@ def _combinations(database: Path) -> int:
 
 def test_one_and_two_workers_give_equal_databases(database: Path) -> None:
     other = _copy(database, "b.db")
-    one = simulate(database, p2=P2, jobs=1)
+    single = simulate(database, p2=P2, jobs=1)
     two = simulate(other, p2=P2, jobs=2)
-    assert (one.combinations, one.found, one.runs) == (two.combinations, two.found, two.runs)
-    assert one.found > 0
+    assert (single.combinations, single.found, single.runs) == (
+        two.combinations,
+        two.found,
+        two.runs,
+    )
+    assert single.found > 0
     assert _digest(database) == _digest(other)
 
 
@@ -70,20 +73,20 @@ def test_the_stored_maps_tell_what_every_block_does(database: Path) -> None:
         table = combination_table(connection)
         maps = intervals_of(connection, table.combination_id.tolist())
         motions = {int(i): load_motion(connection, int(i)) for i in set(table.motion_id)}
-    told = np.full((table.p2.size, k.size), np.nan)
-    for row, owner in zip(told, table.combination_id.tolist(), strict=True):
+    document = np.full((table.p2.size, k.size), np.nan)
+    for row, owner in zip(document, table.combination_id.tolist(), strict=True):
         assert maps[owner]
         for low, high, outcome, *_ in maps[owner]:
             if outcome != "undecided":
                 row[(k >= low) & (k <= high)] = outcome == "topples"
         row[k > max(high for _, high, *_ in maps[owner])] = 0.0
-    decided = np.isfinite(told)
+    decided = np.isfinite(document)
     assert decided.mean() > 0.99
-    topples = np.where(decided, told, 0.0).astype(bool)
+    topples = np.where(decided, document, 0.0).astype(bool)
     assert topples.any(axis=1).tolist() == (table.status == "found").tolist()
     for i in range(0, table.p2.size, 3):
         motion = motions[int(table.motion_id[i])]
-        for value, toppling in zip(k[decided[i]], told[i, decided[i]], strict=True):
+        for value, toppling in zip(k[decided[i]], document[i, decided[i]], strict=True):
             run = respond(
                 motion, p2=table.p2[i], kr=value * motion.pga_g, polarity=table.polarity[i]
             )
@@ -116,14 +119,14 @@ def test_what_a_stored_combination_lacks_is_added(database: Path) -> None:
     simulate(at_once, p2=P2, full_map=True, jobs=1)
     first = simulate(without, p2=P2, jobs=1)
     with opened_database(without) as engine, engine.begin() as connection:
-        whole = content_digest(connection)
+        complete = content_digest(connection)
         connection.execute(delete(simulation).where(simulation.c.grid.is_not(None)))
-        assert content_digest(connection) != whole
+        assert content_digest(connection) != complete
     again = simulate(without, p2=P2, jobs=1)
     assert (again.resumed, again.found) == (0, first.found)
     assert again.runs == 35 * again.combinations
     with opened_database(without, read_only=True) as engine, engine.connect() as connection:
-        assert content_digest(connection) == whole
+        assert content_digest(connection) == complete
     mapped = simulate(without, p2=P2, full_map=True, jobs=2)
     assert (mapped.resumed, mapped.found) == (first.no_motion, first.found)
     assert simulate(without, p2=P2, full_map=True, jobs=1).runs == 0
@@ -234,11 +237,11 @@ def test_spectra_are_stored_with_the_campaign(database: Path) -> None:
         table = combination_table(connection)
     assert len(x) == 6 * 2 * len(P2)
     bound = [
-        x[each]
-        for each in zip(
+        x[item]
+        for item in zip(
             table.motion_id.tolist(), table.polarity.tolist(), table.p2.tolist(), strict=True
         )
     ]
-    found = table.status == "found"
-    assert found.any()
-    assert (table.y_m_s[found] <= 1.02 * np.array(bound)[found]).all()
+    result = table.status == "found"
+    assert result.any()
+    assert (table.y_m_s[result] <= 1.02 * np.array(bound)[result]).all()

@@ -10,10 +10,10 @@ from sqlalchemy import delete
 from rbfrag.campaign.add_motions import add_motions
 from rbfrag.campaign.plan import missing_sizes
 from rbfrag.campaign.simulate import simulate
+from rbfrag.db.campaigns import spectrum_values
 from rbfrag.db.engine import opened_database
 from rbfrag.db.motions import load_motion
 from rbfrag.db.schema import toppling_spectrum as table
-from rbfrag.db.spectra import spectrum_values
 from rbfrag.motions.toppling_spectrum import toppling_spectrum
 from tests.synthetic import write_suite
 
@@ -53,6 +53,6 @@ def test_order_and_interruption_do_not_matter(
 
 
 def test_only_what_is_missing_is_asked_for() -> None:
-    known = {(1, "forward", 3.0), (1, "forward", 0.5), (1, "reverse", 3.0)}
-    assert missing_sizes(known, 1, [3.0, 0.5]) == {"reverse": (0.5,)}
-    assert missing_sizes(known, 2, [3.0]) == {"forward": (3.0,), "reverse": (3.0,)}
+    expected = {(1, "forward", 3.0), (1, "forward", 0.5), (1, "reverse", 3.0)}
+    assert missing_sizes(expected, 1, [3.0, 0.5]) == {"reverse": (0.5,)}
+    assert missing_sizes(expected, 2, [3.0]) == {"forward": (3.0,), "reverse": (3.0,)}

@@ -30,7 +30,7 @@ class Shell:
         document = json.loads(self(*arguments, "--json").stdout)
         for answer in document if isinstance(document, list) else [document]:
             if isinstance(answer, dict) and "warnings" in answer:
-                texts = [each["text"] for each in answer.pop("diagnostics")]
+                texts = [item["text"] for item in answer.pop("diagnostics")]
                 assert texts == [*dict.fromkeys(answer["warnings"])]
         return document
 

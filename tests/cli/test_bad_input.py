@@ -56,11 +56,11 @@ def test_no_database(rejects: Rejects, tmp_path: Path) -> None:
     ):
         assert "rbfrag.db" in rejects(*command)
     # without a name the built-in data answer these
-    for asked in (
+    for inputs in (
         ("predict", "--p2", "3", "--kr", "0.1", "--pgv", "0.6"),
         ("fit", "--term", "pgv"),
     ):
-        assert "none.db" in rejects(*asked, "--db", "none.db")
+        assert "none.db" in rejects(*inputs, "--db", "none.db")
     assert not list(tmp_path.glob("*.db"))
 
 
@@ -69,12 +69,12 @@ def test_counts_by_something_else(rejects: Rejects) -> None:
 
 
 def test_without_a_database_the_reference_answers_and_says_so(shell: Shell) -> None:
-    found = shell.json("predict", "--p2", "3", "--kr", "0.1", "--pgv", "0.6")
-    assert found["data"] == "the built-in data set"
-    assert 0.0 < found["ci_low"] < found["probability"] < found["ci_high"] < 1.0
-    assert found["in_domain"]
+    answer = shell.json("predict", "--p2", "3", "--kr", "0.1", "--pgv", "0.6")
+    assert answer["data"] == "the built-in data set"
+    assert 0.0 < answer["ci_low"] < answer["probability"] < answer["ci_high"] < 1.0
+    assert answer["in_domain"]
     more = shell.json("predict", "--p2", "3", "--kr", "0.1", "--pgv", "0.6", "--pga", "0.5")
-    assert (found["term"], more["term"]) == ("pgv_kr", "pgv_pga")
+    assert (answer["term"], more["term"]) == ("pgv_kr", "pgv_pga")
 
 
 def test_file_that_is_no_database(rejects: Rejects, tmp_path: Path) -> None:
@@ -218,6 +218,6 @@ def test_metadata_may_name_what_no_file_can_be_called(
     table = tmp_path / "metadata.csv"
     table.write_text(f"file\n{record.name}\n{LONG}\n")
     place = tmp_path / "a.db"
-    done = shell("motions", "add", record.parent, "--metadata", table, "--db", place, expect=1)
-    assert "it is not there" in done.stderr
-    assert "Traceback" not in done.stderr
+    process = shell("motions", "add", record.parent, "--metadata", table, "--db", place, expect=1)
+    assert "it is not there" in process.stderr
+    assert "Traceback" not in process.stderr

@@ -29,18 +29,18 @@ FILE = "alpha1_deg = -10\nalpha3_deg = 25\nr3_m = 1.5\nbeta_deg = 5\nphi_deg = 3
 def test_json_is_the_python_answer(shell: Shell) -> None:
     answer = shell.json("block", *ANGLES, *PLANES, "--phi-back", "30", "--kv", "0.1")
     block = rbfrag.Block.from_angles(-10, 25, 1.5)
-    found = rbfrag.stability(block, beta_deg=5, phi_deg=35, phi_back_deg=30, kv=0.1)
+    result = rbfrag.stability(block, beta_deg=5, phi_deg=35, phi_back_deg=30, kv=0.1)
     assert set(answer) >= KEYS
     for key in ("mode", "state", "kr", "ky", "ks", "kct", "yield_acceleration"):
-        assert answer[key] == getattr(found, key)
+        assert answer[key] == getattr(result, key)
     for key in ("p2", "alpha1_deg", "alpha3_deg", "gamma_deg", "r1_m", "r3_m", "shape_factor"):
         assert answer[key] == getattr(block, key)
     assert (answer["mode"], answer["ks"], answer["kct"]) == ("topple", None, None)
-    assert answer["warnings"] == list(found.warnings)
+    assert answer["warnings"] == list(result.warnings)
     assert answer["margins"][0] == {
-        "variable": found.margins[0].variable,
-        "change_deg": found.margins[0].change_deg,
-        "mode": found.margins[0].mode,
+        "variable": result.margins[0].variable,
+        "change_deg": result.margins[0].change_deg,
+        "mode": result.margins[0].mode,
     }
 
 
@@ -208,12 +208,12 @@ def test_block_starts_without_the_heavy_libraries() -> None:
         "heavy = ('numpy', 'pandas', 'statsmodels', 'scipy', 'numba', 'matplotlib', 'sqlalchemy')\n"
         "print([name for name in heavy if name in sys.modules], file=sys.stderr)\n"
     )
-    done = subprocess.run(
+    process = subprocess.run(
         [sys.executable, "-c", program],
         env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
         capture_output=True,
         text=True,
         check=True,
     )
-    assert json.loads(done.stdout)["mode"] == "topple"
-    assert done.stderr.strip() == "[]"
+    assert json.loads(process.stdout)["mode"] == "topple"
+    assert process.stderr.strip() == "[]"

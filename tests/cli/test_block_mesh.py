@@ -42,14 +42,14 @@ def test_the_table_is_one_of_blocks(shell: Shell, suffix: str) -> None:
     shell("predict", "--batch", f"blocks.{suffix}", "--pgv", "0.9", "--out", "answers.csv")
     block = rbfrag.block_from_mesh(BOULDER)
     rocking = block.rocking()
-    found = read_columns(
+    parsed = read_columns(
         "answers.csv", ("p2_1_s2", "kr", "restitution", "probability"), texts=("block_id",)
     )
-    np.testing.assert_array_equal(found["kr"], np.minimum(rocking.kr_forward, rocking.kr_backward))
-    np.testing.assert_array_equal(found["p2_1_s2"], rocking.p2)
-    np.testing.assert_array_equal(found["restitution"], rocking.restitution)
-    assert found["block_id"][:2].tolist() == ["boulder-000", "boulder-005"]
-    assert np.all((found["probability"] >= 0.0) & (found["probability"] <= 1.0))
+    np.testing.assert_array_equal(parsed["kr"], np.minimum(rocking.kr_forward, rocking.kr_backward))
+    np.testing.assert_array_equal(parsed["p2_1_s2"], rocking.p2)
+    np.testing.assert_array_equal(parsed["restitution"], rocking.restitution)
+    assert parsed["block_id"][:2].tolist() == ["boulder-000", "boulder-005"]
+    assert np.all((parsed["probability"] >= 0.0) & (parsed["probability"] <= 1.0))
     # shaking along an azimuth and its opposite is one line
     other = block.hull.rocking(rocking.azimuth_deg + 180.0)
     np.testing.assert_allclose(other.kr_forward, rocking.kr_backward, rtol=1e-12)
@@ -67,12 +67,12 @@ def test_the_page_lists_the_columns_of_the_table(shell: Shell) -> None:
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        (("--s1", "1"), "--mesh cannot be combined with --s1: give one description of the block"),
+        (("--s1", "1"), "--mesh cannot be combined with --s1: a mesh is free-standing"),
         (("--block", "b.toml"), "--mesh cannot be combined with --block"),
-        (("--beta", "5"), "--beta cannot be combined with --mesh"),
-        (("--no-back",), "--no-back cannot be combined with --mesh"),
-        (("--kv", "0.1"), "--kv cannot be combined with --mesh"),
-        (("--cohesion", "1"), "--cohesion cannot be combined with --mesh"),
+        (("--beta", "5"), "--mesh cannot be combined with --beta"),
+        (("--no-back",), "--mesh cannot be combined with --no-back"),
+        (("--kv", "0.1"), "--mesh cannot be combined with --kv"),
+        (("--cohesion", "1"), "--mesh cannot be combined with --cohesion"),
         (("--up", "w"), "up = 'w'"),
         (("--up", "y"), "not its resting pose"),
         (("--contact-mm", "0"), "contact_mm = 0 is not above zero"),

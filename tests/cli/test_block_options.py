@@ -50,19 +50,19 @@ def files(tmp_path: Path, shell: Shell) -> Path:
 
 
 def predicted(shell: Shell, way: tuple[str, ...]) -> tuple[float, ...]:
-    found = shell.json("predict", *way, "--pgv", "0.6")
-    return found["y_m_s"], found["probability"]
+    answer = shell.json("predict", *way, "--pgv", "0.6")
+    return answer["y_m_s"], answer["probability"]
 
 
 def responded(shell: Shell, way: tuple[str, ...]) -> tuple[float, ...]:
-    found = shell.json("respond", "record.AT2", *way)
-    assert found["kind"] == "toppling"
-    return found["critical_angle_deg"], found["peak_theta_n"] or found["toppled_s"]
+    answer = shell.json("respond", "record.AT2", *way)
+    assert answer["kind"] == "toppling"
+    return answer["critical_angle_deg"], answer["peak_theta_n"] or answer["toppled_s"]
 
 
 def searched(shell: Shell, way: tuple[str, ...]) -> tuple[float, ...]:
-    found = shell.json("critical", "record.AT2", *(way[:2] if way[0] == "--p2" else way))
-    return (found["kr_over_pga"],)
+    answer = shell.json("critical", "record.AT2", *(way[:2] if way[0] == "--p2" else way))
+    return (answer["kr_over_pga"],)
 
 
 def at_risk(shell: Shell, way: tuple[str, ...]) -> tuple[float, ...]:
@@ -75,8 +75,8 @@ def mapped(shell: Shell, way: tuple[str, ...]) -> tuple[float, ...]:
 
 def exported(shell: Shell, way: tuple[str, ...]) -> tuple[float, ...]:
     shell("export", "nrml", *way, "--out", "a.xml")
-    (found,) = read_nrml("a.xml")
-    return tuple(found.at([0.7, 1.0]).tolist())
+    (parsed,) = read_nrml("a.xml")
+    return tuple(parsed.at([0.7, 1.0]).tolist())
 
 
 def tabled(shell: Shell, way: tuple[str, ...]) -> tuple[float, ...]:
@@ -91,33 +91,35 @@ def drawn(shell: Shell, way: tuple[str, ...]) -> tuple[float, ...]:
 
 
 @pytest.mark.parametrize(
-    "asked", [predicted, responded, searched, at_risk, mapped, exported, tabled, drawn]
+    "inputs", [predicted, responded, searched, at_risk, mapped, exported, tabled, drawn]
 )
 @pytest.mark.usefixtures("files")
-def test_every_way_gives_the_same_answer(shell: Shell, asked) -> None:
-    by_numbers = asked(shell, WAYS["numbers"])
+def test_every_way_gives_the_same_answer(shell: Shell, inputs) -> None:
+    by_numbers = inputs(shell, WAYS["numbers"])
     assert all(math.isfinite(value) for value in by_numbers)
     for name, way in WAYS.items():
-        assert asked(shell, way) == pytest.approx(by_numbers, rel=1e-9), name
+        assert inputs(shell, way) == pytest.approx(by_numbers, rel=1e-9), name
 
 
 @pytest.mark.usefixtures("files")
 def test_block_tells_the_numbers_of_a_rectangle(shell: Shell) -> None:
     for name in ("rectangle-phi", "angles", "fractures", "block", "polygon"):
-        found = shell.json("block", *WAYS[name])
-        assert found["p2"] == pytest.approx(BLOCK.p2, rel=1e-12)
-        assert found["kr"] == pytest.approx(KR, rel=1e-12)
+        answer = shell.json("block", *WAYS[name])
+        assert answer["p2"] == pytest.approx(BLOCK.p2, rel=1e-12)
+        assert answer["kr"] == pytest.approx(KR, rel=1e-12)
     assert shell.json("block", *SIDES, "--phi", "45")["kr"] == pytest.approx(WIDTH / HEIGHT)
 
 
 def test_the_mode_of_a_rectangle_is_checked_where_friction_is_known(
     shell: Shell, rejects: Rejects
 ) -> None:
-    asked = ("predict", *SIDES, "--pgv", "0.6")
-    said = shell.json(*asked)["warnings"]
-    assert any("assumed to topple" in text for text in said)
-    assert not any("assumed to topple" in t for t in shell.json(*asked, "--phi", "45")["warnings"])
-    assert "the block slides" in rejects(*asked, "--phi", "10")
+    command = ("predict", *SIDES, "--pgv", "0.6")
+    message = shell.json(*command)["warnings"]
+    assert any("assumed to topple" in text for text in message)
+    assert not any(
+        "assumed to topple" in t for t in shell.json(*command, "--phi", "45")["warnings"]
+    )
+    assert "the block slides" in rejects(*command, "--phi", "10")
 
 
 ALPHA1 = ("--alpha1", "-10", "--alpha3", "20", "--r3", "1")
@@ -142,7 +144,7 @@ ALPHA1 = ("--alpha1", "-10", "--alpha3", "20", "--r3", "1")
         (("--p2", "3", "--kr", "0.1", "--out", "a.csv"), "--out requires --blocks"),
         (
             (*SIDES, "--batch", "a.csv", "--out", "b.csv"),
-            "--blocks cannot be combined with --height",
+            "--height cannot be combined with the blocks of a.csv",
         ),
         ((), "--p2 is missing"),
     ],
@@ -150,18 +152,19 @@ ALPHA1 = ("--alpha1", "-10", "--alpha3", "20", "--r3", "1")
 def test_descriptions_that_do_not_go_together(
     rejects: Rejects, options: tuple[str, ...], words: str
 ) -> None:
+    Path("a.csv").write_text("p2_1_s2,kr\n3,0.1\n")
     assert words in rejects("predict", *options, "--pgv", "0.6")
 
 
 def test_respond_needs_friction_for_the_film_of_a_rectangle(
     shell: Shell, rejects: Rejects, files: Path
 ) -> None:
-    asked = ("respond", "record.AT2", *SIDES)
-    assert "requires the block geometry and --phi" in rejects(*asked, "--film", "a.gif")
+    arguments = ("respond", "record.AT2", *SIDES)
+    assert "requires the block geometry and --phi" in rejects(*arguments, "--film", "a.gif")
     for command in ("respond", "critical"):
-        said = shell.json(command, *asked[1:])["warnings"]
-        assert any("assumed to topple" in text for text in said)
-    assert "--phi is missing" in rejects("critical", *asked[1:], "--kind", "slumping")
+        message = shell.json(command, *arguments[1:])["warnings"]
+        assert any("assumed to topple" in text for text in message)
+    assert "--phi is missing" in rejects("critical", *arguments[1:], "--kind", "slumping")
 
 
 def test_tables_of_rectangles(shell: Shell, files: Path) -> None:
@@ -175,10 +178,10 @@ def test_tables_of_rectangles(shell: Shell, files: Path) -> None:
         assert float(row[column]) == pytest.approx(alone["probability"], rel=1e-12)
     assert (float(rows[3][column]), rows[3][-1].strip('"')) == (1.0, "unstable")
     table.write_text("height_m,width_m,dip_deg\n2,0.5,3\n2,0.5,0\n")
-    asked = ("--component", "single")
-    found = shell.json("hazard", "curve.csv", "--blocks", table, *asked)["blocks"]
-    alone = shell.json("hazard", "curve.csv", *SIDES, *asked)
-    assert found[1]["annual_rate"] == pytest.approx(alone["annual_rate"], rel=1e-12)
+    command = ("--component", "single")
+    answer = shell.json("hazard", "curve.csv", "--blocks", table, *command)["blocks"]
+    alone = shell.json("hazard", "curve.csv", *SIDES, *command)
+    assert answer[1]["annual_rate"] == pytest.approx(alone["annual_rate"], rel=1e-12)
     points = [
         {
             "type": "Feature",
@@ -188,8 +191,8 @@ def test_tables_of_rectangles(shell: Shell, files: Path) -> None:
     ]
     place = files / "blocks.geojson"
     place.write_text(json.dumps({"type": "FeatureCollection", "features": points}))
-    found = shell.json("hazard", "curve.csv", "--blocks", place, *asked)
-    assert found["annual_rate"] == pytest.approx(alone["annual_rate"], rel=1e-12)
+    answer = shell.json("hazard", "curve.csv", "--blocks", place, *command)
+    assert answer["annual_rate"] == pytest.approx(alone["annual_rate"], rel=1e-12)
 
 
 def test_a_table_without_blocks_says_what_it_needs(rejects: Rejects, files: Path) -> None:

@@ -1,4 +1,4 @@
-"""What a shell offers while a command is typed, asked as shells ask."""
+"""Completions that a shell offers while a command is typed."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ PROGRAM = "import sys; sys.argv = ['rbfrag']; from rbfrag.cli.main import run; r
 
 def offered(typed: str) -> list[str]:
     """Return what is offered for the last word."""
-    done = subprocess.run(
+    process = subprocess.run(
         [sys.executable, "-c", PROGRAM], capture_output=True, text=True, check=False,
         env={
             **os.environ, "_RBFRAG_COMPLETE": "complete_bash", "COMP_WORDS": typed,
@@ -26,8 +26,8 @@ def offered(typed: str) -> list[str]:
             "PYTHONPATH": os.pathsep.join(part for part in sys.path if part),
         },
     )  # fmt: skip
-    assert "Traceback" not in done.stderr
-    return done.stdout.split()
+    assert "Traceback" not in process.stderr
+    return process.stdout.split()
 
 
 def test_models_and_motions(shell: Shell, tmp_path: Path) -> None:
@@ -41,3 +41,9 @@ def test_models_and_motions(shell: Shell, tmp_path: Path) -> None:
     assert offered("rbfrag respond --db own.db 2") == ["2"]
     assert offered("rbfrag respond --db nowhere.db 2") == []
     assert "bounded-pgv_kr" in offered("rbfrag models show bounded-p")  # those that are shipped
+
+
+def test_options_that_help_does_not_show_are_offered_too() -> None:
+    assert {"--pgv", "--jrc", "--kct-sigma", "--no-back", "--help-all"} <= {
+        *offered("rbfrag predict --")
+    }

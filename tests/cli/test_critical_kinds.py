@@ -26,9 +26,9 @@ def slump(tmp_path: Path) -> Path:
 
 
 def test_slumping_answers_as_python_does(shell: Shell, record: Path, slump: Path) -> None:
-    asked = ("critical", record, "--kind", "slumping", "--block", slump, "--rotation", "2")
-    told = shell.json(*asked, "--reverse")
-    found = critical(
+    command = ("critical", record, "--kind", "slumping", "--block", slump, "--rotation", "2")
+    document = shell.json(*command, "--reverse")
+    result = critical(
         read_motions(record)[0],
         block=Block.from_angles(56, 76, 0.7),
         beta_deg=22,
@@ -36,22 +36,22 @@ def test_slumping_answers_as_python_does(shell: Shell, record: Path, slump: Path
         rotation_deg=2.0,
         polarity="reverse",
     )
-    assert (told["scale"], told["lower"]) == (found.scale, found.lower_scale)
-    assert (told["status"], told["k_over_pga"]) == ("found", found.kr_over_pga)
-    assert (told["ks"], told["ps2"]) == (found.yield_g, found.p2)
-    assert told["y_m_s"] == pytest.approx(found.y_m_s, rel=1e-14)
-    assert told["certified"] is False
-    printed = shell(*asked).stdout
+    assert (document["scale"], document["lower"]) == (result.scale, result.lower_scale)
+    assert (document["status"], document["k_over_pga"]) == ("found", result.kr_over_pga)
+    assert (document["ks"], document["ps2"]) == (result.yield_g, result.p2)
+    assert document["y_m_s"] == pytest.approx(result.y_m_s, rel=1e-14)
+    assert document["certified"] is False
+    printed = shell(*command).stdout
     assert "The block fails if the record is multiplied by" in printed
 
 
 def test_sliding_answers_as_python_does(shell: Shell, record: Path) -> None:
-    told = shell.json("critical", record, "--kind", "sliding", "--displacement", "0.02,0.1")
+    document = shell.json("critical", record, "--kind", "sliding", "--displacement", "0.02,0.1")
     motion = read_motions(record)[0]
-    for each, distance in zip(told["thresholds"], (0.02, 0.1), strict=True):
-        assert each["ky_over_pga"] == critical(motion, displacement_m=distance).kr_over_pga
-    assert told["ky_over_pga"] == told["thresholds"][0]["ky_over_pga"]
-    curve = [row["displacement_m"] for row in told["displacements"]]
+    for threshold, distance in zip(document["thresholds"], (0.02, 0.1), strict=True):
+        assert threshold["ky_over_pga"] == critical(motion, displacement_m=distance).kr_over_pga
+    assert document["ky_over_pga"] == document["thresholds"][0]["ky_over_pga"]
+    curve = [row["displacement_m"] for row in document["displacements"]]
     assert curve == sliding_displacements(motion, KY_OVER_PGA).tolist()
     assert "On a dipping base" in shell("critical", record, "--kind", "sliding").stdout
 

@@ -33,45 +33,53 @@ def database(shell: Shell) -> None:
 @pytest.mark.usefixtures("database")
 def test_nrml_of_several_blocks(shell: Shell) -> None:
     Path("blocks.csv").write_text(BLOCKS)
-    told = shell.json("export", "nrml", "--blocks", "blocks.csv", "--out", "a.xml")
-    assert (told["functions"], told["model"]) == (2, "wls-pgv")
-    found = read_nrml("a.xml")
-    assert [f.name for f in found] == ["A7", "B2"]
+    document = shell.json("export", "nrml", "--blocks", "blocks.csv", "--out", "a.xml")
+    assert (document["functions"], document["model"]) == (2, "wls-pgv")
+    parsed = read_nrml("a.xml")
+    assert [f.name for f in parsed] == ["A7", "B2"]
     x = np.linspace(0.3, 1.4, 50)
     expected = rbfrag.predict(3.0, 0.1, pgv_m_s=x).probability
-    assert np.abs(found[0].at(x) - expected).max() < 1.2 * told["largest_relative_error"] + 1e-6
+    assert (
+        np.abs(parsed[0].at(x) - expected).max() < 1.2 * document["largest_relative_error"] + 1e-6
+    )
 
 
 @pytest.mark.usefixtures("database")
 def test_pelicun_of_one_block_in_pga(shell: Shell) -> None:
-    told = shell.json(
+    document = shell.json(
         "export", "pelicun", "--p2", "3", "--kr", "0.1", "--imt", "PGA",
         "--levels", "300", "--name", "boulder", "--out", "a.csv",
     )  # fmt: skip
-    (found,) = read_pelicun("a.csv")
-    assert (found.name, found.kind.measure) == ("boulder", "pga_g")
+    (parsed,) = read_pelicun("a.csv")
+    assert (parsed.name, parsed.kind.measure) == ("boulder", "pga_g")
     x = np.linspace(0.4, 1.8, 50)
     expected = rbfrag.predict(3.0, 0.1, pga_g=x).probability
-    assert np.abs(found.at(x) - expected).max() < 1.2 * told["largest_relative_error"] + 1e-5
+    assert np.abs(parsed.at(x) - expected).max() < 1.2 * document["largest_relative_error"] + 1e-5
 
 
 def test_functions_of_free_standing_blocks(shell: Shell, rejects: Callable[..., str]) -> None:
     Path("blocks.csv").write_text("p2_1_s2,kr,restitution\n3,0.1,0.8\n10,0.3,\n")
     rocking = ("--kind", "rocking", "--levels", "300")
-    told = shell.json("export", "nrml", "--blocks", "blocks.csv", *rocking, "--out", "a.xml")
+    document = shell.json("export", "nrml", "--blocks", "blocks.csv", *rocking, "--out", "a.xml")
     shell.json(
         "export", "pelicun", "--p2", "3", "--kr", "0.1", "--restitution", "0.8", *rocking,
         "--out", "a.csv",
     )  # fmt: skip
-    bouncing, own = read_nrml("a.xml")
+    bouncing, reference = read_nrml("a.xml")
     (alone,) = read_pelicun("a.csv")
     x = np.geomspace(0.1, 3.0, 50)
-    for found, block in ((bouncing, (3.0, 0.1, 0.8)), (alone, (3.0, 0.1, 0.8)), (own, (10, 0.3))):
+    for result, block in (
+        (bouncing, (3.0, 0.1, 0.8)),
+        (alone, (3.0, 0.1, 0.8)),
+        (reference, (10, 0.3)),
+    ):
         p2, kr, *restitution = block
         expected = rbfrag.predict(
             p2, kr, kind="rocking", restitution=restitution[0] if restitution else None, pgv_m_s=x
         ).probability
-        assert np.abs(found.at(x) - expected).max() < 1.2 * told["largest_relative_error"] + 1e-5
+        assert (
+            np.abs(result.at(x) - expected).max() < 1.2 * document["largest_relative_error"] + 1e-5
+        )
     assert "Overturning of free-standing rock blocks" in Path("a.xml").read_text()
     assert "that is free-standing" in json.loads(Path("a.json").read_text())["block"]["Description"]
     backed = ("export", "nrml", "--p2", "3", "--kr", "0.1", "--out", "b.xml")
@@ -84,15 +92,15 @@ def test_functions_of_free_standing_blocks(shell: Shell, rejects: Callable[..., 
 @pytest.mark.usefixtures("database")
 def test_nrml_of_a_spectral_acceleration(shell: Shell) -> None:
     for imt in ("SA(1.0)", "SA(1)"):
-        told = shell.json(
+        document = shell.json(
             "export", "nrml", "--p2", "3", "--kr", "0.1", "--imt", imt, "--out", "a.xml"
         )
-        assert told["term"] == "sa10"
-    (found,) = read_nrml("a.xml")
-    assert (found.kind.measure, found.kind.period_s) == ("sa_g", 1.0)
+        assert document["term"] == "sa10"
+    (parsed,) = read_nrml("a.xml")
+    assert (parsed.kind.measure, parsed.kind.period_s) == ("sa_g", 1.0)
     x = np.linspace(0.2, 2.0, 50)
     expected = rbfrag.predict(3.0, 0.1, sa_g={1.0: x}).probability
-    assert np.abs(found.at(x) - expected).max() < 1.2 * told["largest_relative_error"] + 1e-5
+    assert np.abs(parsed.at(x) - expected).max() < 1.2 * document["largest_relative_error"] + 1e-5
 
 
 @pytest.mark.usefixtures("database")
@@ -118,14 +126,14 @@ def test_a_lognormal_model_is_written_as_such(shell: Shell) -> None:
         save_model(connection, of_line)
     options = ("--p2", "3", "--kr", "0.1", "--db", "line.db")
     for kind, file in (("nrml", "a.xml"), ("pelicun", "a.csv")):
-        told = shell.json("export", kind, *options, "--out", file)
-        assert (told["lognormal"], told["largest_relative_error"]) == (1, 0.0)
+        document = shell.json("export", kind, *options, "--out", file)
+        assert (document["lognormal"], document["largest_relative_error"]) == (1, 0.0)
     (nrml,), (pelicun,) = read_nrml("a.xml"), read_pelicun("a.csv")
     x = np.geomspace(0.1, 5.0, 200)
     expected = rbfrag.predict(3.0, 0.1, pgv_m_s=x, db="line.db").probability
-    for found in (nrml, pelicun):
-        assert found.is_lognormal
-        assert np.abs(found.at(x) - expected).max() < 2e-9
+    for result in (nrml, pelicun):
+        assert result.is_lognormal
+        assert np.abs(result.at(x) - expected).max() < 2e-9
 
 
 @pytest.mark.usefixtures("database")
@@ -135,16 +143,18 @@ def test_a_rock_mass_is_the_mean_of_its_toppling_blocks(shell: Shell) -> None:
         'spacing_m = { distribution = "uniform", low = 1.0, high = 2.0 }\n'
         "[back]\ndip_deg = 85.0\nspacing_m = 0.4\n[friction]\nphi_deg = 40.0\n"
     )
-    told = shell.json("export", "nrml", "--rockmass", "mass.toml", "--name", "m", "--out", "a.xml")
-    (found,) = read_nrml("a.xml")
+    document = shell.json(
+        "export", "nrml", "--rockmass", "mass.toml", "--name", "m", "--out", "a.xml"
+    )
+    (parsed,) = read_nrml("a.xml")
     shell("rockmass", "mass.toml", "--out", "blocks.csv")
     rows = np.genfromtxt("blocks.csv", delimiter=",", names=True, dtype=None, encoding="utf-8")
     rows = rows[(rows["mode"] == "topple") & (rows["kr"] > 0)]
-    assert f"{rows.size} stable toppling blocks" in told["warnings"][0]
+    assert f"{rows.size} stable toppling blocks" in document["warnings"][0]
     x = np.linspace(0.2, 1.4, 30)
-    each = rbfrag.predict(rows["p2_1_s2"][:, None], rows["kr"][:, None], pgv_m_s=x[None, :])
-    mean = each.probability.mean(axis=0)
-    assert np.abs(found.at(x) - mean).max() < 1.2 * told["largest_relative_error"] + 1e-6
+    separate = rbfrag.predict(rows["p2_1_s2"][:, None], rows["kr"][:, None], pgv_m_s=x[None, :])
+    mean = separate.probability.mean(axis=0)
+    assert np.abs(parsed.at(x) - mean).max() < 1.2 * document["largest_relative_error"] + 1e-6
 
 
 @pytest.mark.usefixtures("database")
@@ -155,8 +165,8 @@ def test_a_rock_mass_with_several_limit_states(shell: Shell, rejects: Callable[.
         "[back]\ndip_deg = 85.0\nspacing_m = 0.4\n[friction]\nphi_deg = 40.0\n"
     )
     mass = ("export", "nrml", "--rockmass", "mass.toml", "--name", "face", "--out", "a.xml")
-    told = shell.json(*mass, "--shares", "1,10,50")
-    assert told["functions"] == 3
+    document = shell.json(*mass, "--shares", "1,10,50")
+    assert document["functions"] == 3
     assert [(f.name, f.limit_state) for f in read_nrml("a.xml")] == [
         ("face", f"failed_{share}_percent") for share in (1, 10, 50)
     ]
@@ -168,13 +178,13 @@ def test_a_rock_mass_with_several_limit_states(shell: Shell, rejects: Callable[.
 @pytest.mark.usefixtures("database")
 def test_pelicun_has_a_description_beside_the_table(shell: Shell) -> None:
     Path("blocks.csv").write_text("block_id,p2_1_s2,kr\nA-7,3,0.1\nB2,10,0.3\n")
-    told = shell.json("export", "pelicun", "--blocks", "blocks.csv", "--out", "fragility.csv")
-    assert told["description"] == "fragility.json"
+    document = shell.json("export", "pelicun", "--blocks", "blocks.csv", "--out", "fragility.csv")
+    assert document["description"] == "fragility.json"
     entries = json.loads(Path("fragility.json").read_text())
     assert {"A.7", "B2"} == set(entries) - {"_GeneralInformation", "References"}
     assert "p² = 3 1/s²" in entries["A.7"]["Description"]
     assert [f.name for f in read_pelicun("fragility.csv")] == ["A.7", "B2"]
-    assert any("'A-7' is written as 'A.7'" in text for text in told["warnings"])
+    assert any("'A-7' is written as 'A.7'" in text for text in document["warnings"])
 
 
 @pytest.mark.usefixtures("database")
@@ -214,4 +224,4 @@ def test_the_measures_that_work_are_named_and_no_others(rejects: Rejects) -> Non
         message = rejects(
             "export", "nrml", "--p2", "3", "--kr", "0.1", "--imt", imt, "--out", "a.xml"
         )
-        assert message.endswith(f"{imt}: no model reads it alone: use one of PGV, PGA, SA(1)")
+        assert message.endswith(f"{imt}: no model uses it alone: use one of PGV, PGA, SA(1)")

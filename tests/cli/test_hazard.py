@@ -33,21 +33,21 @@ def curve(shell: Shell) -> Path:
 
 
 def test_one_block(shell: Shell, curve: Path) -> None:
-    found = shell.json("hazard", curve, "--p2", "3", "--kr", "0.1", "--component", "single")
-    assert found["ci_low"] < found["annual_rate"] < found["ci_high"]
-    assert found["probability"] == pytest.approx(1 - np.exp(-50 * found["annual_rate"]))
-    assert (found["years"], found["imt"], found["term"]) == (50.0, "PGV", "pgv")
-    parts = sum(part["annual_rate"] for part in found["contributions"])
-    assert parts == pytest.approx(found["annual_rate"], rel=0.05)
+    answer = shell.json("hazard", curve, "--p2", "3", "--kr", "0.1", "--component", "single")
+    assert answer["ci_low"] < answer["annual_rate"] < answer["ci_high"]
+    assert answer["probability"] == pytest.approx(1 - np.exp(-50 * answer["annual_rate"]))
+    assert (answer["years"], answer["imt"], answer["term"]) == (50.0, "PGV", "pgv")
+    parts = sum(part["annual_rate"] for part in answer["contributions"])
+    assert parts == pytest.approx(answer["annual_rate"], rel=0.05)
     # a steep fragility fails about as often as its median is exceeded: y = 0.566 = 0.72 PGV
-    assert found["annual_rate"] == pytest.approx(1e-3 * (0.566 / 0.72) ** -2, rel=0.05)
+    assert answer["annual_rate"] == pytest.approx(1e-3 * (0.566 / 0.72) ** -2, rel=0.05)
 
 
 def test_a_curve_that_ends_too_early_is_no_answer(shell: Shell, curve: Path) -> None:
-    asked = ("--p2", "3", "--kr", "0.1", "--component", "single")
-    assert "between" not in shell("hazard", curve, *asked).stdout.splitlines()[0]
+    command = ("--p2", "3", "--kr", "0.1", "--component", "single")
+    assert "between" not in shell("hazard", curve, *command).stdout.splitlines()[0]
     Path("map.csv").write_text("PGV [m/s],return_period_years\n0.1,475\n0.2,2475\n")
-    printed = shell("hazard", "map.csv", *asked).stdout
+    printed = shell("hazard", "map.csv", *command).stdout
     # shaking above 0.2 m/s comes once in 2,475 years and may fail the block each time
     assert printed.startswith("Return period of failure at least 2,500 years: the hazard curve")
 
@@ -55,8 +55,8 @@ def test_a_curve_that_ends_too_early_is_no_answer(shell: Shell, curve: Path) -> 
 def test_a_single_block_is_described_as_in_a_prediction(shell: Shell, curve: Path) -> None:
     block = ("--p2", "3", "--kr", "0.1")
 
-    def line(*asked: object) -> str:
-        printed = shell(*asked, *block).stdout.splitlines()
+    def line(*inputs: object) -> str:
+        printed = shell(*inputs, *block).stdout.splitlines()
         return next(text for text in printed if text.startswith("Block "))
 
     described = line("predict", "--pgv", "0.5")
@@ -93,20 +93,20 @@ def test_a_row_that_is_no_block_has_its_reason(shell: Shell, curve: Path, name: 
     Path("blocks.csv").write_text(
         "block_id,p2_1_s2,kr\nA7,3,0.1\nbad,x,0.1\nB2,10,0.3\nflat,3,-0.1\nshort,3\n"
     )
-    done = shell("hazard", curve, "--blocks", "blocks.csv", "--out", name)
-    assert "3 of 5 blocks could not be used and are left out of all sums" in done.stdout
-    assert "the first is line 3 (block bad): p2_1_s2 = 'x' is not a number" in done.stdout
+    process = shell("hazard", curve, "--blocks", "blocks.csv", "--out", name)
+    assert "3 of 5 blocks could not be used and are left out of all sums" in process.stdout
+    assert "the first is line 3 (block bad): p2_1_s2 = 'x' is not a number" in process.stdout
     names = ("annual_rate", "block_id", "reason")
-    found = read_columns(name, names[:1], texts=names[1:])
-    assert found["block_id"].tolist() == ["A7", "bad", "B2", "flat", "short"]
-    assert np.isfinite(found["annual_rate"]).tolist() == [True, False, True, False, False]
-    assert found["reason"].tolist()[:3] == ["", "p2_1_s2 = 'x' is not a number", ""]
-    assert "kr = -0.1" in found["reason"][3]
-    assert found["reason"][4] == "2 cells under 3 columns"
+    parsed = read_columns(name, names[:1], texts=names[1:])
+    assert parsed["block_id"].tolist() == ["A7", "bad", "B2", "flat", "short"]
+    assert np.isfinite(parsed["annual_rate"]).tolist() == [True, False, True, False, False]
+    assert parsed["reason"].tolist()[:3] == ["", "p2_1_s2 = 'x' is not a number", ""]
+    assert "kr = -0.1" in parsed["reason"][3]
+    assert parsed["reason"][4] == "2 cells under 3 columns"
     Path("sound.csv").write_text("block_id,p2_1_s2,kr\nA7,3,0.1\nB2,10,0.3\n")
     shell("hazard", curve, "--blocks", "sound.csv", "--out", "sound-rates.csv")
     expected = read_columns("sound-rates.csv", names[:1])["annual_rate"]
-    assert found["annual_rate"][[0, 2]] == pytest.approx(expected, rel=1e-12)
+    assert parsed["annual_rate"][[0, 2]] == pytest.approx(expected, rel=1e-12)
 
 
 def test_a_table_of_blocks(shell: Shell, curve: Path) -> None:
@@ -119,47 +119,47 @@ def test_a_table_of_blocks(shell: Shell, curve: Path) -> None:
     assert float(rows[0]["annual_rate"]) == pytest.approx(alone["annual_rate"], rel=1e-8)
     alone = shell.json("hazard", curve, "--blocks", "blocks.csv")
     assert (alone["annual_rate_any"], "bounds" in alone) == (None, False)
-    asked = ("hazard", curve, "--blocks", "blocks.csv", "--years", "100", "--joint")
-    found = shell.json(*asked)
-    assert [row["block_id"] for row in found["blocks"]] == ["A7", "B2"]
-    assert set(found) == {
+    command = ("hazard", curve, "--blocks", "blocks.csv", "--years", "100", "--joint")
+    answer = shell.json(*command)
+    assert [row["block_id"] for row in answer["blocks"]] == ["A7", "B2"]
+    assert set(answer) == {
         "site", "annual_rate_any", "annual_rate_any_ci", "probability_any", "annual_rate_at_least",
         "joint_law", "bounds", "expected_failures_per_year", "expected_failures_upper_bound",
         "expected_failures_low", "expected_failures_high", "years", "level", "how", "model",
         "term", "method", "imt", "curve_kind", "between_measures", "blocks", "warnings",
     }  # fmt: skip
-    assert found["how"] == f"model {found['model']}"
-    each = [row["annual_rate"] for row in found["blocks"]]
-    assert found["expected_failures_per_year"] == pytest.approx(sum(each), rel=1e-12)
-    assert max(each) < found["annual_rate_any"] < sum(each)
+    assert answer["how"] == f"model {answer['model']}"
+    separate = [row["annual_rate"] for row in answer["blocks"]]
+    assert answer["expected_failures_per_year"] == pytest.approx(sum(separate), rel=1e-12)
+    assert max(separate) < answer["annual_rate_any"] < sum(separate)
     # a Poisson process of earthquakes
-    assert found["probability_any"] == pytest.approx(1 - np.exp(-100 * found["annual_rate_any"]))
-    assert any("blocks are assumed to be at one site" in text for text in found["warnings"])
-    printed = shell(*asked).stdout
-    assert f"return period {return_period(found['annual_rate_any'])}" in printed
+    assert answer["probability_any"] == pytest.approx(1 - np.exp(-100 * answer["annual_rate_any"]))
+    assert any("blocks are assumed to be at one site" in text for text in answer["warnings"])
+    printed = shell(*command).stdout
+    assert f"return period {return_period(answer['annual_rate_any'])}" in printed
     assert (
-        f"Expected failures {annual_rate(found['expected_failures_per_year'])} /yr of 2 blocks"
+        f"Expected failures {annual_rate(answer['expected_failures_per_year'])} /yr of 2 blocks"
         in printed
     )
     assert "At least one failure: return period" in printed
-    ends = found["expected_failures_low"], found["expected_failures_high"]
-    assert ends[0] < sum(each) < ends[1]
+    ends = answer["expected_failures_low"], answer["expected_failures_high"]
+    assert ends[0] < sum(separate) < ends[1]
     assert "numerical_error" not in printed
-    periods = f"A7 ({return_period(each[0])}), B2 ({return_period(each[1])})"
+    periods = f"A7 ({return_period(separate[0])}), B2 ({return_period(separate[1])})"
     assert f"Shortest return periods: {periods}" in printed
 
 
 def test_numbers_of_failures_that_are_asked_for(shell: Shell, curve: Path) -> None:
     rows = "".join(f"b{i},3,{0.1 + 0.01 * i}\n" for i in range(6))
     Path("blocks.csv").write_text("block_id,p2_1_s2,kr\n" + rows)
-    found = shell.json("hazard", curve, "--blocks", "blocks.csv", "--at-least", "3,6")
-    counts = {row["count"]: row["annual_rate"] for row in found["annual_rate_at_least"]}
+    answer = shell.json("hazard", curve, "--blocks", "blocks.csv", "--at-least", "3,6")
+    counts = {row["count"]: row["annual_rate"] for row in answer["annual_rate_at_least"]}
     assert list(counts) == [1, 3, 6]
-    assert counts[1] == found["annual_rate_any"] > counts[3] > counts[6] > 0.0
-    told = shell("hazard", curve, "--blocks", "blocks.csv", "--at-least", "7", expect=2).stderr
-    assert "at least 7 failures of 6 blocks" in told
-    told = shell("hazard", curve, "--blocks", "blocks.csv", "--at-least", "x", expect=2).stderr
-    assert "give whole numbers separated by commas" in told
+    assert counts[1] == answer["annual_rate_any"] > counts[3] > counts[6] > 0.0
+    message = shell("hazard", curve, "--blocks", "blocks.csv", "--at-least", "7", expect=2).stderr
+    assert "at least 7 failures of 6 blocks" in message
+    message = shell("hazard", curve, "--blocks", "blocks.csv", "--at-least", "x", expect=2).stderr
+    assert "give whole numbers separated by commas" in message
 
 
 @pytest.fixture
@@ -171,28 +171,28 @@ def test_blocks_stand_at_sites_by_their_id(shell: Shell, curve: Path, logic_tree
     mean = logic_tree / "hazard_curve-mean-PGV_7.csv"
     head = "block_id,p2_1_s2,kr,site_id\n"
     Path("blocks.csv").write_text(head + "A,3,0.1,SLIDE-A\nB,10,0.2,0012\nC,3,0.2,0012\n")
-    found = shell.json("hazard", mean, "--blocks", "blocks.csv", "--component", "rotd50",
+    answer = shell.json("hazard", mean, "--blocks", "blocks.csv", "--component", "rotd50",
                        "--out", "rates.csv", "--joint")  # fmt: skip
-    assert [(row["site"], row["block_id"]) for row in found["blocks"]] == [
+    assert [(row["site"], row["block_id"]) for row in answer["blocks"]] == [
         ("SLIDE-A", "A"), ("0012", "B"), ("0012", "C"),
     ]  # fmt: skip
-    assert [one["site"] for one in found["sites"]] == ["0012"]
+    assert [site["site"] for site in answer["sites"]] == ["0012"]
     alone = shell.json("hazard", mean, "--site", "SLIDE-A", "--p2", "3", "--kr", "0.1",
                        "--component", "rotd50")  # fmt: skip
-    assert found["blocks"][0]["annual_rate"] == pytest.approx(alone["annual_rate"], rel=1e-9)
+    assert answer["blocks"][0]["annual_rate"] == pytest.approx(alone["annual_rate"], rel=1e-9)
     with Path("rates.csv").open() as file:
         assert [row["site"] for row in csv.DictReader(file)] == ["SLIDE-A", "0012", "0012"]
     both = shell.json("hazard", mean, "--blocks", "blocks.csv", "--at-least", "2")
-    counts = [[each["count"] for each in one["annual_rate_at_least"]]
-              for one in both["sites"] if "annual_rate_at_least" in one]  # fmt: skip
+    counts = [[item["count"] for item in site["annual_rate_at_least"]]
+              for site in both["sites"] if "annual_rate_at_least" in site]  # fmt: skip
     assert counts == [[1, 2]]
     rejected = shell("hazard", mean, "--blocks", "blocks.csv", "--at-least", "3", expect=2).stderr
     assert "at least 3 failures of" in rejected
     only = shell.json("hazard", mean, "--blocks", "blocks.csv", "--site", "0012")
     assert [row["block_id"] for row in only["blocks"]] == ["B", "C"]
     Path("blocks.csv").write_text(head + "A,3,0.1,12\n")
-    told = shell("hazard", mean, "--blocks", "blocks.csv", expect=2).stderr
-    assert "stands at site '12', of which there is no curve" in told
+    message = shell("hazard", mean, "--blocks", "blocks.csv", expect=2).stderr
+    assert "stands at site '12', of which there is no curve" in message
     unnamed = shell.json("hazard", curve, "--blocks", "blocks.csv")
     assert any("site_id of the blocks is not used" in text for text in unnamed["warnings"])
 
@@ -200,14 +200,14 @@ def test_blocks_stand_at_sites_by_their_id(shell: Shell, curve: Path, logic_tree
 def test_blocks_stand_at_the_nearest_site_by_place(
     shell: Shell, logic_tree: Path, formats_dir: Path
 ) -> None:
-    """What a place tells is what the identifier of that site tells, for curves and events alike."""
+    """A place and the identifier of its site give the same answer, for curves and events."""
     mean = logic_tree / "hazard_curve-mean-PGV_7.csv"
     events = formats_dir / "openquake_event_based" / "one_realization"
     with (events / "sitemesh_1.csv").open() as file:
         sites = list(csv.DictReader(list(file)[1:]))[:3]
-    by_id = [f"B{i},3,0.1,{one['custom_site_id']}" for i, one in enumerate(sites)]
+    by_id = [f"B{i},3,0.1,{site['custom_site_id']}" for i, site in enumerate(sites)]
     by_place = [
-        f"B{i},3,0.1,{float(one['lon']) + 0.0004},{one['lat']}" for i, one in enumerate(sites)
+        f"B{i},3,0.1,{float(site['lon']) + 0.0004},{site['lat']}" for i, site in enumerate(sites)
     ]
     Path("id.csv").write_text("\n".join(["block_id,p2_1_s2,kr,site_id", *by_id]))
     Path("place.csv").write_text(
@@ -216,23 +216,23 @@ def test_blocks_stand_at_the_nearest_site_by_place(
     for command in (("hazard", mean), ("losses", events, "--expected")):
         rates = []
         for table in ("id.csv", "place.csv"):
-            found = shell.json(*command, "--blocks", table, "--component", "rotd50")
-            blocks = found.get("blocks") or found["answers"]
+            answer = shell.json(*command, "--blocks", table, "--component", "rotd50")
+            blocks = answer.get("blocks") or answer["answers"]
             rates.append(
                 {
                     row["block_id"]: row.get("annual_rate", row.get("average_annual_failures"))
                     for row in blocks
                 }
             )
-        assert any("at the nearest sites" in text for text in found["warnings"])
+        assert any("at the nearest sites" in text for text in answer["warnings"])
         assert any("within_km is 5" in str(row.get("reason")) for row in blocks)
         assert rates[1].pop("F") is None
         assert rates[1] == pytest.approx(rates[0], rel=1e-12)
-        told = shell(*command, "--blocks", "place.csv", "--within-km", "0.001", expect=2).stderr
-        assert "km away" in told
+        message = shell(*command, "--blocks", "place.csv", "--within-km", "0.001", expect=2).stderr
+        assert "km away" in message
     Path("nowhere.csv").write_text("block_id,p2_1_s2,kr\nA,3,0.1\nB,3,0.1\n")
-    told = shell("hazard", mean, "--blocks", "nowhere.csv", expect=2).stderr
-    assert "2 of 2 blocks have no site" in told
+    message = shell("hazard", mean, "--blocks", "nowhere.csv", expect=2).stderr
+    assert "2 of 2 blocks have no site" in message
 
 
 def test_places_have_letters_for_signs() -> None:
@@ -242,28 +242,41 @@ def test_places_have_letters_for_signs() -> None:
 
 def test_branches_with_openquakes_weights(shell: Shell, curve: Path, logic_tree: Path) -> None:
     branches = sorted(logic_tree.glob("hazard_curve-rlz-*-PGV_7.csv"))
-    asked = ("--site", "RIDGE_2", "--p2", "3", "--kr", "0.1", "--component", "rotd50")
-    found = shell.json("hazard", *branches, *asked, "--weights",
+    command = ("--site", "RIDGE_2", "--p2", "3", "--kr", "0.1", "--component", "rotd50")
+    answer = shell.json("hazard", *branches, *command, "--weights",
                        logic_tree / "realizations_7.csv")  # fmt: skip
-    each = [shell.json("hazard", one, *asked)["annual_rate"] for one in branches]
-    assert found["annual_rate"] == pytest.approx(np.dot((0.5, 0.3, 0.2), each), rel=1e-6)
-    assert found["logic_tree_low"] == pytest.approx(min(each), rel=1e-9)
-    assert found["logic_tree_high"] == pytest.approx(max(each), rel=1e-9)
+    separate = [shell.json("hazard", branch, *command)["annual_rate"] for branch in branches]
+    assert answer["annual_rate"] == pytest.approx(np.dot((0.5, 0.3, 0.2), separate), rel=1e-6)
+    assert answer["logic_tree_low"] == pytest.approx(min(separate), rel=1e-9)
+    assert answer["logic_tree_high"] == pytest.approx(max(separate), rel=1e-9)
     # the branches and what is not known of the model together
-    assert found["annual_rate_p05"] < min(each) < found["annual_rate_p50"]
-    assert max(each) < found["annual_rate_p95"]
-    assert found["curve_kind"] == "weighted branches"
-    assert [row["weight"] for row in found["branches"]] == pytest.approx([0.5, 0.3, 0.2])
+    assert answer["annual_rate_p05"] < min(separate) < answer["annual_rate_p50"]
+    assert max(separate) < answer["annual_rate_p95"]
+    assert answer["curve_kind"] == "weighted branches"
+    assert [row["weight"] for row in answer["branches"]] == pytest.approx([0.5, 0.3, 0.2])
     # the engine's mean curve is that of the branches
-    mean = shell.json("hazard", logic_tree / "hazard_curve-mean-PGV_7.csv", *asked)
+    mean = shell.json("hazard", logic_tree / "hazard_curve-mean-PGV_7.csv", *command)
     assert mean["curve_kind"] == "mean"
-    assert found["annual_rate"] == pytest.approx(mean["annual_rate"], rel=2e-3)
-    middle = shell.json("hazard", logic_tree / "quantile_curve-0.5-PGV_7.csv", *asked)
+    assert answer["annual_rate"] == pytest.approx(mean["annual_rate"], rel=2e-3)
+    middle = shell.json("hazard", logic_tree / "quantile_curve-0.5-PGV_7.csv", *command)
     assert any("quantile-0.5 is not a realization" in w for w in middle["warnings"])
-    printed = shell("hazard", *branches, *asked, "--weights", "0.5,0.3,0.2").stdout
+    printed = shell("hazard", *branches, *command, "--weights", "0.5,0.3,0.2").stdout
     assert "rlz-002" in printed
-    other = shell("hazard", branches[0], curve, *asked[2:], expect=2).stderr
+    other = shell("hazard", branches[0], curve, *command[2:], expect=2).stderr
     assert "give curves of the same sites" in other
+
+
+def test_drained_rates_are_of_all_branches(shell: Shell, curve: Path) -> None:
+    lines = curve.read_text().splitlines()
+    rows = [(level, 2.0 * float(rate)) for level, rate in (line.split(",") for line in lines[1:])]
+    Path("other.csv").write_text(
+        "\n".join([lines[0], *(f"{level},{rate!r}" for level, rate in rows)])
+    )
+    wet = ("--height", "2.4", "--width", "0.5", "--dip", "3", "--phi", "35", "--water", "0.4")
+    dry = shell.json("hazard", curve, *wet[:-2], "--component", "single")["annual_rate"]
+    weighted = "hazard", curve, "other.csv", "--weights", "0.25,0.75", *wet
+    answer = shell.json(*weighted, "--component", "single")["drained"]
+    assert answer["annual_rate"] == pytest.approx(1.75 * dry, rel=1e-9)
 
 
 def test_a_rock_mass_is_one_class(shell: Shell, curve: Path) -> None:
@@ -272,7 +285,7 @@ def test_a_rock_mass_is_one_class(shell: Shell, curve: Path) -> None:
         'spacing_m = { distribution = "uniform", low = 1.0, high = 2.0 }\n'
         "[back]\ndip_deg = 85.0\nspacing_m = 0.4\n[friction]\nphi_deg = 40.0\n"
     )
-    found = shell.json("hazard", curve, "--rockmass", "mass.toml", "--component", "rotd50",
+    document = shell.json("hazard", curve, "--rockmass", "mass.toml", "--component", "rotd50",
                        "--out", "rates.csv")  # fmt: skip
     shell("rockmass", "mass.toml", "--out", "blocks.csv")
     with Path("blocks.csv").open() as file:
@@ -281,11 +294,15 @@ def test_a_rock_mass_is_one_class(shell: Shell, curve: Path) -> None:
         writer = csv.writer(file)
         writer.writerow(["block_id", "p2_1_s2", "kr"])
         writer.writerows([r["block_id"], r["p2_1_s2"], r["kr"]] for r in rows)
-    each = shell.json("hazard", curve, "--blocks", "each.csv", "--component", "rotd50")["blocks"]
+    separate = shell.json("hazard", curve, "--blocks", "each.csv", "--component", "rotd50")[
+        "blocks"
+    ]
     # the mean of the rates is the rate of the mean fragility
-    mean = np.mean([answer["annual_rate"] for answer in each])
-    assert found["annual_rate"] == pytest.approx(mean, rel=1e-9)
-    assert min(one["ci_low"] for one in each) < found["ci_low"] < mean < found["ci_high"]
+    mean = np.mean([answer["annual_rate"] for answer in separate])
+    assert document["annual_rate"] == pytest.approx(mean, rel=1e-9)
+    assert (
+        min(item["ci_low"] for item in separate) < document["ci_low"] < mean < document["ci_high"]
+    )
     with Path("rates.csv").open() as file:
         (row,) = csv.DictReader(file)
     assert (row["block_id"], row["kr"]) == ("rock mass", "")
@@ -300,10 +317,10 @@ def test_plot(shell: Shell, curve: Path) -> None:
     ("text", "options", "words"),
     [
         ("sa(0.5)_g,annual_rate\n0.1,0.01\n0.5,0.001\n", (),
-         "no model reads SA(0.5) alone: give a curve of one of PGV, SA(1), PGA, or"
+         "no model uses SA(0.5) alone: give a curve of one of PGV, SA(1), PGA, or"
          " turn it into PGV with --convert bommer_alarcon_2006"),
         ("sa(0.75)_g,annual_rate\n0.1,0.01\n0.5,0.001\n", (),
-         "no model reads SA(0.75) alone: give a curve of one of PGV, SA(1), PGA"),
+         "no model uses SA(0.75) alone: give a curve of one of PGV, SA(1), PGA"),
         ("pga_g,annual_rate\n0.1,0.01\n0.5,0.001\n", (),
          "PGA alone is biased; give a curve of PGV or SA(1.0), or the --disaggregation by"),
         ("pgv_m_s,annual_rate\n0.1,0.01\n0.5,0.001\n", ("--convert-sigma", "0.5"),
@@ -341,8 +358,8 @@ def test_blocks_that_do_not_wait_are_rejected(rejects: Callable[..., str], curve
 def test_a_block_that_waits_for_no_earthquake_is_rejected(
     shell: Shell, curve: Path, p2: str, kr: str
 ) -> None:
-    told = shell("hazard", curve, f"--p2={p2}", f"--kr={kr}", expect=2).stderr
-    assert "above" in told or "is not a number" in told or "beyond any block" in told
+    message = shell("hazard", curve, f"--p2={p2}", f"--kr={kr}", expect=2).stderr
+    assert "above" in message or "is not a number" in message or "beyond any block" in message
 
 
 def test_free_standing_blocks_with_their_restitution(shell: Shell, rejects: Rejects) -> None:
@@ -350,35 +367,35 @@ def test_free_standing_blocks_with_their_restitution(shell: Shell, rejects: Reje
     Path("b.csv").write_text(
         "block_id,p2_1_s2,kr,restitution,kr_sigma\nA,7,0.2,,0.1\nB,7,0.2,0.8,\n"
     )
-    asked = ("hazard", "curve.csv", "--component", "single", "--kind", "rocking")
-    answer = shell.json(*asked, "--blocks", "b.csv")
+    command = ("hazard", "curve.csv", "--component", "single", "--kind", "rocking")
+    answer = shell.json(*command, "--blocks", "b.csv")
     rows = answer["blocks"]
     # what a block may be is integrated
     uncertain = ("--kr-sigma", "0.1")
-    for row, stated in zip(rows, (uncertain, ("--restitution", "0.8")), strict=True):
-        told = shell.json(*asked, "--p2", "7", "--kr", "0.2", *stated)
-        assert told["model"] == "rocking-pgv"
-        assert row["annual_rate"] == pytest.approx(told["annual_rate"], rel=1e-6)
+    for row, value in zip(rows, (uncertain, ("--restitution", "0.8")), strict=True):
+        document = shell.json(*command, "--p2", "7", "--kr", "0.2", *value)
+        assert document["model"] == "rocking-pgv"
+        assert row["annual_rate"] == pytest.approx(document["annual_rate"], rel=1e-6)
     assert rows[1]["annual_rate"] < rows[0]["annual_rate"]
-    shape = shell.json(*asked, "--height", "2", "--width", "0.5")
-    kr = shell.json(*asked, "--p2", repr(rbfrag.Block.rectangle(2.0, 0.5).p2), "--kr", "0.25")
+    shape = shell.json(*command, "--height", "2", "--width", "0.5")
+    kr = shell.json(*command, "--p2", repr(rbfrag.Block.rectangle(2.0, 0.5).p2), "--kr", "0.25")
     assert shape["annual_rate"] == pytest.approx(kr["annual_rate"], rel=1e-6)
     backed = ("hazard", "curve.csv", "--p2", "7", "--kr", "0.2", "--restitution", "0.8")
     assert shell.json(*backed)["model"] == "rocking-pgv"
     rejected = rejects(*backed, "--kind", "toppling")
     assert "--restitution cannot be combined with kind toppling" in rejected
-    wrong = (*asked, "--p2", "7", "--kr", "0.2", "--restitution", "1.2")
+    wrong = (*command, "--p2", "7", "--kr", "0.2", "--restitution", "1.2")
     assert "restitution = 1.2" in rejects(*wrong)
 
 
 def test_a_standing_rock_is_uncertain_in_its_restitution_too(shell: Shell) -> None:
     Path("curve.csv").write_text("pgv_m_s,annual_rate\n0.05,0.02\n0.5,0.002\n2,0.0001\n")
-    asked = (
+    command = (
         "survival", "curve.csv", "--component", "single", "--kind", "rocking", "--p2", "7",
         "--kr", "0.2", "--restitution", "0.85", "--age", "500",
     )  # fmt: skip
-    certain = shell.json(*asked)
-    nearly = shell.json(*asked, "--restitution-sigma", "1e-6")
+    certain = shell.json(*command)
+    nearly = shell.json(*command, "--restitution-sigma", "1e-6")
     assert nearly["probability_standing"] == pytest.approx(
         certain["probability_standing"], rel=1e-5
     )
@@ -392,9 +409,9 @@ def test_a_standing_rock_is_uncertain_in_its_restitution_too(shell: Shell) -> No
         for e in values[::10]
     ]
     mean = float(np.average(standing, weights=weight[::10]))
-    told = shell.json(*asked, "--restitution-sigma", "0.05")
-    assert told["probability_standing"] == pytest.approx(mean, rel=2e-3)
-    assert told["probability_standing"] != certain["probability_standing"]
+    document = shell.json(*command, "--restitution-sigma", "0.05")
+    assert document["probability_standing"] == pytest.approx(mean, rel=2e-3)
+    assert document["probability_standing"] != certain["probability_standing"]
 
 
 def test_warnings_are_counted_by_kind() -> None:
@@ -405,5 +422,5 @@ def test_warnings_are_counted_by_kind() -> None:
 def test_several_blocks_without_a_site_are_rejected(rejects: Rejects, logic_tree: Path) -> None:
     Path("blocks.csv").write_text("block_id,p2_1_s2,kr\nA,3,0.1\nB,10,0.2\n")
     mean = logic_tree / "hazard_curve-mean-PGV_7.csv"
-    told = rejects("hazard", mean, "--blocks", "blocks.csv")
-    assert "2 of 2 blocks have no site" in told
+    message = rejects("hazard", mean, "--blocks", "blocks.csv")
+    assert "2 of 2 blocks have no site" in message

@@ -33,13 +33,14 @@ FIRST = ("motions add", "simulate", "fit")
 
 NO_SENTENCE = {
     "models list": "--json", "motions list": "--json", "motions export": "the file",
+    "motions rotate": "the file",
     "db upgrade": "the schema", "db info": "--by suite: a table", "db check": "counts",
     "db export": "counts of rows", "db merge": "counts of rows",
     "db import": "counts of rows", "models default": "the model",
     "models check": "a table", "export nrml": "the file", "export pelicun": "the file",
     "motions add": "counts", **{f"plot {name}": "the file" for name in (
-        "fit", "chart", "curve", "sensitivity", "calibration", "vertical", "spectrum", "response",
-        "modes", "rotation", "planes",
+        "fit", "chart", "critical", "curve", "sensitivity", "calibration", "vertical", "spectrum",
+        "response", "modes", "rotation", "planes",
     )},
 }  # fmt: skip
 """Commands whose example prints something else, and what."""

@@ -20,7 +20,7 @@ from tests.cli.conftest import Shell
 ROOT = Path(__file__).resolve().parent.parent.parent
 
 BY_DATA = {"combinations_by_status", "domain", "impossible", "modes", "other_models", "rows",
-    "uncovered_share", "variables",
+    "sa_g", "uncovered_share", "variables",
 }  # fmt: skip
 """Keys of objects whose own keys are data: names of modes, tables, variables and reasons."""
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from rbfrag.cli.commands.simulate import WorkerOptions
+from rbfrag.cli.options import runner
 from rbfrag.db.engine import opened_database
 from rbfrag.db.models import save_model
 from rbfrag.exchange.event_losses import losses
@@ -94,7 +94,7 @@ def test_table_of_events_and_plot(shell: Shell, job: Path) -> None:
 
 
 def test_files_by_name_and_time_by_option(shell: Shell, job: Path) -> None:
-    whole = shell.json("losses", job, "--blocks", "blocks.csv", "--expected")
+    complete = shell.json("losses", job, "--blocks", "blocks.csv", "--expected")
     files = [
         part
         for name in ("gmf-data", "events", "sitemesh", "realizations")
@@ -102,7 +102,7 @@ def test_files_by_name_and_time_by_option(shell: Shell, job: Path) -> None:
     ]
     time = ("--investigation-time", "50", "--ses", "2")
     named = shell.json("losses", *files, "--blocks", "blocks.csv", "--expected", *time)
-    assert named == whole
+    assert named == complete
 
 
 def test_what_is_rejected(rejects: Rejects, job: Path) -> None:
@@ -149,7 +149,7 @@ def test_workers_give_the_same_answer(
 ) -> None:
     monkeypatch.setattr("rbfrag.hazards.losses.PAIRS_AT_ONCE", 1)  # a part for each year
     alone = losses(job, "blocks.csv", samples=30)
-    two = losses(job, "blocks.csv", samples=30, run=WorkerOptions(jobs=2).runner(count_years))
+    two = losses(job, "blocks.csv", samples=30, run=runner(count_years, 2, None))
     assert two.as_dict() == alone.as_dict()
     assert two.loss_variance.tolist() == alone.loss_variance.tolist()
 

@@ -31,7 +31,7 @@ PREDICT_KEYS = {
     "probability", "ci_low", "ci_high", "level", "model", "term", "method", "y_m_s", "block_sd",
     "intensity_m_s", "in_domain", "warnings", "pgv_over_pga_s", "answers", "kind", "mode",
     "shaking", "failure", "median_displacement_m", "event_low", "event_high", "data", "how",
-    "drained",
+    "drained", "uncertainty", "as_stated", "sensitivity", "solution",
 }  # fmt: skip
 SIMULATE_KEYS = {"combinations", "found", "below_limit", "runs", "seconds", "resumed"}
 FIT_KEYS = {
@@ -82,12 +82,12 @@ def test_reverse_is_the_negated_record(shell: Shell, record: Path, tmp_path: Pat
 
 
 def test_critical_brackets_what_respond_says(shell: Shell, record: Path) -> None:
-    found = shell.json("critical", record, "--p2", "3")
-    assert set(found) >= CRITICAL_KEYS
-    assert found["status"] == "found"
-    assert found["lower"] == found["kr_over_pga"] < found["upper"]
-    below = found["lower"] * found["pga_g"]
-    above = found["upper"] * found["pga_g"] * (1.0 + 1e-9)
+    document = shell.json("critical", record, "--p2", "3")
+    assert set(document) >= CRITICAL_KEYS
+    assert document["status"] == "found"
+    assert document["lower"] == document["kr_over_pga"] < document["upper"]
+    below = document["lower"] * document["pga_g"]
+    above = document["upper"] * document["pga_g"] * (1.0 + 1e-9)
     for kr, outcome in ((below, "toppled"), (above, "stable")):
         answer = shell.json("respond", record, "--p2", "3", "--kr", repr(kr))
         assert answer["outcome"] == outcome
@@ -213,7 +213,7 @@ def test_predict_starts_without_the_heavy_libraries(shell: Shell, tmp_path: Path
         f"loaded = [name for name in {HEAVY!r} if name in sys.modules]\n"
         "print(loaded, file=sys.stderr)\n"
     )
-    done = subprocess.run(
+    process = subprocess.run(
         [sys.executable, "-c", program],
         cwd=tmp_path,
         env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
@@ -221,5 +221,5 @@ def test_predict_starts_without_the_heavy_libraries(shell: Shell, tmp_path: Path
         text=True,
         check=True,
     )
-    assert set(json.loads(done.stdout)) == {*PREDICT_KEYS, "diagnostics"}
-    assert done.stderr.strip() == "[]"
+    assert set(json.loads(process.stdout)) == {*PREDICT_KEYS, "diagnostics"}
+    assert process.stderr.strip() == "[]"

@@ -13,16 +13,13 @@ from rbfrag.db.engine import opened_database
 from rbfrag.db.insert import update_rows
 from rbfrag.db.location import REFERENCE
 from rbfrag.db.schema import fragility_model
-from rbfrag.db.upgrade import upgrade_database
 from tests.cli.conftest import Rejects, Shell
 from tests.synthetic import write_suite
 
 
 @pytest.fixture
 def database(tmp_path: Path) -> Path:
-    copy = Path(shutil.copy(REFERENCE, tmp_path / "rbfrag.db"))
-    upgrade_database(copy)
-    return copy
+    return Path(shutil.copy(REFERENCE, tmp_path / "rbfrag.db"))
 
 
 def change(database: Path, statement: str) -> None:
@@ -31,22 +28,22 @@ def change(database: Path, statement: str) -> None:
 
 
 def test_data_as_they_were(shell: Shell, database: Path) -> None:
-    found = shell.json("models", "check")
-    told = {each["name"]: each for each in found}
-    assert told["bounded-pgv_pga"] == {
+    answer = shell.json("models", "check")
+    values = {item["name"]: item for item in answer}
+    assert values["bounded-pgv_pga"] == {
         "name": "bounded-pgv_pga", "state": "unchanged", "remark": ""
     }  # fmt: skip
     # of blocks that slump or stand free the reference has the models alone
-    without = {name for name, each in told.items() if each["state"] != "unchanged"}
+    without = {name for name, item in values.items() if item["state"] != "unchanged"}
     assert without
     assert {name.partition("-")[0] for name in without} == {
         "confined_toppling",
         "slumping",
         "rocking",
     }
-    assert {told[name]["state"] for name in without} == {"no data"}
+    assert {values[name]["state"] for name in without} == {"no data"}
     headline, *lines = shell("models", "check").stdout.splitlines()
-    assert f"{len(found)} fitted models: " in headline
+    assert f"{len(answer)} fitted models: " in headline
     assert f"{len(without)} no data" in headline
     assert ["model", "data"] in [line.split() for line in lines]
 
@@ -57,9 +54,9 @@ def test_another_critical_value_is_noticed(shell: Shell, database: Path) -> None
         "UPDATE combination SET y_m_s = 1.001 * y_m_s WHERE id = (SELECT min(id) FROM combination "
         "WHERE status = 'found' AND kind = 'toppling' AND vertical_motion_id IS NULL)",
     )
-    told = shell("models", "check", expect=1).stdout
-    assert "other values: fit it again in its place, by rbfrag fit" in told
-    assert " changed" in told.splitlines()[0]
+    output = shell("models", "check", expect=1).stdout
+    assert "other values: fit it again in its place, by rbfrag fit" in output
+    assert " changed" in output.splitlines()[0]
 
 
 def test_a_value_that_is_gone_is_counted(shell: Shell, database: Path) -> None:
@@ -75,11 +72,11 @@ def test_a_value_that_is_gone_is_counted(shell: Shell, database: Path) -> None:
 def test_a_model_that_cannot_be_read_is_told(shell: Shell, database: Path) -> None:
     # as a later rbfrag would have stored it, with its digest
     with opened_database(database) as engine, engine.begin() as connection:
-        one = fragility_model.c.name == "bounded-pgv_kr"
-        update_rows(connection, fragility_model, one, {"method": "guess"})
-    told = shell("models", "check", expect=1).stdout
-    assert "unreadable" in told
-    assert "'guess', which is not supported by this version" in " ".join(told.split())
+        single = fragility_model.c.name == "bounded-pgv_kr"
+        update_rows(connection, fragility_model, single, {"method": "guess"})
+    output = shell("models", "check", expect=1).stdout
+    assert "unreadable" in output
+    assert "'guess', which is not supported by this version" in " ".join(output.split())
 
 
 def test_without_a_database_it_is_rejected(rejects: Rejects, tmp_path: Path) -> None:
@@ -102,12 +99,10 @@ def test_a_campaign_of_two_sizes_ends_in_one_sentence(
 def test_a_default_is_chosen_in_a_copy_of_the_built_in_data(
     shell: Shell, rejects: Rejects, tmp_path: Path
 ) -> None:
-    said = rejects("models", "default", "logistic-sa10")
-    assert "copy" in said
-    assert str(REFERENCE) in said
-    assert "rbfrag db upgrade" in said
+    message = rejects("models", "default", "logistic-sa10")
+    assert "copy" in message
+    assert str(REFERENCE) in message
     shutil.copy(REFERENCE, tmp_path / "rbfrag.db")
-    shell("db", "upgrade")
     shell("models", "default", "logistic-sa10")
-    defaults = [each["name"] for each in shell.json("models", "list") if each["is_default"]]
+    defaults = [item["name"] for item in shell.json("models", "list") if item["is_default"]]
     assert "logistic-sa10" in defaults

@@ -32,7 +32,8 @@ def test_every_figure_of_the_database(
         "curve": ("--p2", "3", "--kr", "0.1"),
         "fit": ("--log",),
         "calibration": (),
-        "sensitivity": (),
+        "critical": (),
+        "sensitivity": ("--height", "2", "--width", "0.4", "--phi", "40", "--pgv", "0.9"),
         "spectrum": ("1", "2"),
     }
     for name, options in figures.items():
@@ -65,11 +66,11 @@ def test_a_curve_of_a_free_standing_block(shell: Shell, rejects: Rejects, tmp_pa
     for more in (
         ("--kind", "rocking", "--restitution", "0.9"), ("--restitution", "0.9"), ("--no-back",),
     ):  # fmt: skip
-        done = shell("plot", "curve", *shape, *more)
+        process = shell("plot", "curve", *shape, *more)
         assert "model PGV, rocking" in path.read_text(encoding="utf-8")
-        assert "no plane backs the block" not in done.stdout
-    told = rejects("plot", "curve", *shape, "--kind", "toppling", "--restitution", "0.9")
-    assert "restitution cannot be combined with kind toppling" in told
+        assert "no plane backs the block" not in process.stdout
+    message = rejects("plot", "curve", *shape, "--kind", "toppling", "--restitution", "0.9")
+    assert "restitution cannot be combined with kind toppling" in message
 
 
 def test_curves_of_blocks_that_slide_and_slump(
@@ -77,16 +78,16 @@ def test_curves_of_blocks_that_slide_and_slump(
 ) -> None:
     path = tmp_path / "other.svg"
     drawn = ("plot", "curve", "--db", REFERENCE, "--out", path)
-    done = shell(*drawn, "--ky", "0.2", "--displacement", "0.1")
-    assert "rises again" not in done.stdout
+    process = shell(*drawn, "--ky", "0.2", "--displacement", "0.1")
+    assert "rises again" not in process.stdout
     assert "slides too far" in path.read_text(encoding="utf-8")
     shell(*drawn, "--height", "2.5", "--width", "2.5", "--dip", "20", "--phi", "32",
           "--displacement", "0.1", "--pga", "0.5")  # fmt: skip
     assert "model PGV, PGA, sliding" in path.read_text(encoding="utf-8")
     shell(*drawn, "--ks", "0.2", "--ps2", "3", "--pga", "0.5")
     assert "the block slumps" in path.read_text(encoding="utf-8")
-    told = rejects(*drawn, "--ky", "0.2", "--displacement", "0.1", "--over", "sa10")
-    assert "no stored sliding model works with sa10_g" in told
+    message = rejects(*drawn, "--ky", "0.2", "--displacement", "0.1", "--over", "sa10")
+    assert "no stored sliding model works with sa10_g" in message
 
 
 def test_yield_over_rotation(shell: Shell, rejects: Rejects, tmp_path: Path) -> None:

@@ -21,7 +21,7 @@ ROWS: tuple[tuple[Any, ...], ...] = (
 )
 """A title, rows and columns that are empty, units, a decimal comma, a cell without a header."""
 
-ASKED = ("--blocks", "survey.xlsx", "--sheet", "north wall")
+COMMAND = ("--blocks", "survey.xlsx", "--sheet", "north wall")
 
 
 @pytest.fixture
@@ -47,14 +47,14 @@ def of_one(shell: Shell, height: str, width: str, dip: str) -> Any:
 
 @pytest.mark.usefixtures("book")
 def test_a_sheet_with_titles_is_answered_as_its_blocks_are_alone(shell: Shell) -> None:
-    found = shell.json("predict", *ASKED, "--pgv", "0.6", "--component", "single")
-    assert [row["block_id"] for row in found["blocks"]] == ["A7", "B2"]
-    for row, sides in zip(found["blocks"], (("2.4", ".5", "3"), ("3", ".6", "5")), strict=True):
+    answer = shell.json("predict", *COMMAND, "--pgv", "0.6", "--component", "single")
+    assert [row["block_id"] for row in answer["blocks"]] == ["A7", "B2"]
+    for row, sides in zip(answer["blocks"], (("2.4", ".5", "3"), ("3", ".6", "5")), strict=True):
         alone = of_one(shell, *sides)
         for name in ("probability", "ci_low", "ci_high"):
             assert row[name] == pytest.approx(alone[name], rel=1e-12)
         assert (row["kind"], row["mode"], row["reason"]) == ("toppling", "topple", "")
-    assert found["warnings"] == [
+    assert answer["warnings"] == [
         BACK_FRICTION,
         "the names of the columns are in row 4: the lines above are ignored",
         "column 5 without a name is ignored and not written",
@@ -65,7 +65,7 @@ def test_a_sheet_with_titles_is_answered_as_its_blocks_are_alone(shell: Shell) -
 
 @pytest.mark.usefixtures("book")
 def test_the_list_on_the_terminal(shell: Shell, monkeypatch: pytest.MonkeyPatch) -> None:
-    head, _, table = shell("predict", *ASKED, "--pgv", "0.6").stdout.partition("\n\n")
+    head, _, table = shell("predict", *COMMAND, "--pgv", "0.6").stdout.partition("\n\n")
     assert head == "All 2 blocks are answered."
     assert "Failures  expected 0.263; 0–1 if one earthquake shakes all blocks" in table
     assert "Model     bounded-pgv_kr; 2 of 2 rows within the fitted range" in table
@@ -75,17 +75,17 @@ def test_the_list_on_the_terminal(shell: Shell, monkeypatch: pytest.MonkeyPatch)
     ]
     monkeypatch.setattr("rbfrag.exchange.table_answers.SHOWN", 1)
     monkeypatch.setattr("rbfrag.exchange.table_answers.MOST_LISTED", 1)
-    assert "... 1 of 2 rows: --out FILE" in shell("predict", *ASKED, "--pgv", "0.6").stdout
-    cut = shell.json("predict", *ASKED, "--pgv", "0.6")
+    assert "... 1 of 2 rows: --out FILE" in shell("predict", *COMMAND, "--pgv", "0.6").stdout
+    cut = shell.json("predict", *COMMAND, "--pgv", "0.6")
     assert (cut["rows"], len(cut["blocks"])) == (2, 1)
 
 
 @pytest.mark.usefixtures("book")
 def test_every_command_reads_the_sheet(shell: Shell, rejects: Rejects) -> None:
-    found = shell.json("hazard", "curve.csv", *ASKED)
-    assert [row["block_id"] for row in found["blocks"]] == ["A7", "B2"]
-    shell("survival", "curve.csv", *ASKED, "--kind", "rocking", "--age", "100")
-    shell("export", "pelicun", *ASKED, "--out", "a.csv")
+    answer = shell.json("hazard", "curve.csv", *COMMAND)
+    assert [row["block_id"] for row in answer["blocks"]] == ["A7", "B2"]
+    shell("survival", "curve.csv", *COMMAND, "--kind", "rocking", "--age", "100")
+    shell("export", "pelicun", *COMMAND, "--out", "a.csv")
     first = rejects("predict", "--pgv", "0.6", "--blocks", "survey.xlsx")
     assert "columns are Contents (of the first sheet; the sheets are Sheet, north wall)" in first
     for command in (
@@ -124,11 +124,11 @@ def test_a_template_is_answered(shell: Shell, rejects: Rejects, suffix: str) -> 
     untouched = shell.json("predict", "--blocks", name, "--pgv", "0.6", "--component", "single")
     assert untouched["warnings"] == [BACK_FRICTION, "the only row is 'example' of the template"]
     add_row(Path(name))
-    found = shell.json("predict", "--blocks", name, "--pgv", "0.6", "--component", "single")
-    (row,) = found["blocks"]
+    answer = shell.json("predict", "--blocks", name, "--pgv", "0.6", "--component", "single")
+    (row,) = answer["blocks"]
     # nothing is said of columns that are empty
     skipped = "the row 'example' of the template is skipped"
-    assert found["warnings"] == [BACK_FRICTION, skipped]
+    assert answer["warnings"] == [BACK_FRICTION, skipped]
     alone = of_one(shell, "2.4", "0.5", "3")
     assert row["block_id"] == "A1"
     assert row["probability"] == pytest.approx(alone["probability"], rel=1e-12)

@@ -8,8 +8,8 @@ import pytest
 
 from rbfrag.question.question import predict
 from rbfrag.solver.block.geometry import Block
-from rbfrag.solver.mechanism import shaken_mechanism
 from rbfrag.solver.models import model_of_kind
+from rbfrag.solver.simulation import shaken_mechanism
 from tests.cli.conftest import Rejects, Shell
 from tests.synthetic import write_suite
 
@@ -24,25 +24,25 @@ def block(tmp_path: Path) -> Path:
 
 
 def test_a_slide_is_answered_as_from_python(shell: Shell, block: Path) -> None:
-    asked = ("predict", "--kind", "sliding", "--displacement", "0.05", "--component", "single",
+    command = ("predict", "--kind", "sliding", "--displacement", "0.05", "--component", "single",
              *MOTION)  # fmt: skip
-    told = shell.json(*asked, "--ky", "0.1", "--beta", "10")
-    stated = {"displacement_m": 0.05, "pgv_m_s": 0.4, "pga_g": 0.5, "component": "single"}
-    answer = predict(ky=0.1, beta_deg=10.0, **stated)
-    answers = told.pop("answers")
-    assert told == answer.as_dict()
-    assert [each["model"] for each in answers] == ["sliding-pgv_pga", "sliding-pgv"]
-    assert told == {
+    document = shell.json(*command, "--ky", "0.1", "--beta", "10")
+    value = {"displacement_m": 0.05, "pgv_m_s": 0.4, "pga_g": 0.5, "component": "single"}
+    answer = predict(ky=0.1, beta_deg=10.0, **value)
+    answers = document.pop("answers")
+    assert document == answer.as_dict()
+    assert [item["model"] for item in answers] == ["sliding-pgv_pga", "sliding-pgv"]
+    assert document == {
         k: v
-        for k, v in shell.json(*asked[:1], *asked[3:], "--ky", "0.1", "--beta", "10").items()
+        for k, v in shell.json(*command[:1], *command[3:], "--ky", "0.1", "--beta", "10").items()
         if k != "answers"
     }
-    assert told["data"] == "the built-in data set"
+    assert document["data"] == "the built-in data set"
     block.write_text(SLIDE)
-    from_file = shell.json(*asked, "--block", block)
-    by_hand = predict(ky=0.36397023, beta_deg=20.0, **stated)
+    from_file = shell.json(*command, "--block", block)
+    by_hand = predict(ky=0.36397023, beta_deg=20.0, **value)
     assert from_file["probability"] == pytest.approx(by_hand.probability, rel=1e-5)
-    assert "median displacement 0." in shell(*asked, "--ky", "0.1").stdout
+    assert "median displacement 0." in shell(*command, "--ky", "0.1").stdout
 
 
 def test_a_slump_is_answered_as_from_python(shell: Shell, block: Path) -> None:
@@ -51,13 +51,13 @@ def test_a_slump_is_answered_as_from_python(shell: Shell, block: Path) -> None:
         model_of_kind("slumping"), Block.from_angles(56, 76, 0.7), beta_deg=22, phi_deg=30
     )
     for rotation_deg, option in ((None, ()), (2.0, ("--rotation", "2"))):
-        asked = ("predict", "--kind", "slumping", *MOTION, *option)
-        told = shell.json(*asked, "--block", block)
+        command = ("predict", "--kind", "slumping", *MOTION, *option)
+        document = shell.json(*command, "--block", block)
         answer = predict(
             ks=shaken.yield_g, ps2=shaken.p2, pgv_m_s=0.4, pga_g=0.5, rotation_deg=rotation_deg
         )
-        assert told["probability"] == pytest.approx(answer.probability, rel=1e-12)
-        numbers = shell.json(*asked, "--ks", str(shaken.yield_g), "--ps2", str(shaken.p2))
+        assert document["probability"] == pytest.approx(answer.probability, rel=1e-12)
+        numbers = shell.json(*command, "--ks", str(shaken.yield_g), "--ps2", str(shaken.p2))
         assert numbers["probability"] == answer.probability
 
 
@@ -111,12 +111,12 @@ def test_what_does_not_fit_is_rejected(
 
 def test_a_block_of_another_mode_is_rejected(rejects: Rejects, block: Path) -> None:
     block.write_text(SLIDE)
-    asked = ("predict", "--block", block, *MOTION)
-    assert "the failure mode is slide" in rejects(*asked, "--kind", "slumping")
-    assert "give --displacement" in rejects(*asked)
+    command = ("predict", "--block", block, *MOTION)
+    assert "the failure mode is slide" in rejects(*command, "--kind", "slumping")
+    assert "give --displacement" in rejects(*command)
     block.write_text(SLUMP)
     distance = ("--displacement", "0.1")
-    assert "the failure mode is slump" in rejects(*asked, "--kind", "sliding", *distance)
+    assert "the failure mode is slump" in rejects(*command, "--kind", "sliding", *distance)
 
 
 def test_a_campaign_is_run_fitted_and_asked(shell: Shell, tmp_path: Path) -> None:
@@ -132,11 +132,11 @@ def test_a_campaign_is_run_fitted_and_asked(shell: Shell, tmp_path: Path) -> Non
     (listed,) = shell.json("models", "list")
     assert (listed["name"], listed["kind"]) == ("sliding-pgv_pga", "sliding")
     assert "unchanged" in shell("models", "check").stdout
-    told = shell.json(
+    document = shell.json(
         "predict", "--kind", "sliding", "--ky", "0.1", "--displacement", "0.05", *MOTION
     )
-    assert told["model"] == "sliding-pgv_pga"
-    assert "reference" not in told["data"]
+    assert document["model"] == "sliding-pgv_pga"
+    assert "reference" not in document["data"]
 
 
 def test_options_of_one_kind_do_not_go_with_another(rejects: Rejects) -> None:
@@ -150,20 +150,20 @@ def test_options_of_one_kind_do_not_go_with_another(rejects: Rejects) -> None:
 
 
 def test_a_rectangle_in_another_unit_is_doubted(shell: Shell) -> None:
-    told = shell("predict", "--height", "240", "--width", "50", "--pgv", "0.6").stdout
-    assert told.startswith("Check the unit: height 240 m (in cm?)")
+    output = shell("predict", "--height", "240", "--width", "50", "--pgv", "0.6").stdout
+    assert output.startswith("Check the unit: height 240 m (in cm?)")
     assert "Check the unit" not in shell("predict", "--height", "2.4", "--width", "0.5",
                                            "--pgv", "0.6").stdout  # fmt: skip
 
 
 def test_a_block_that_fails_at_rest_is_said_to(shell: Shell, rejects: Rejects) -> None:
     steep = ("--height", "2", "--width", "0.5", "--dip", "40", "--phi", "35", "--pgv", "0.3")
-    told = shell.json("predict", *steep)
-    assert told["probability"] == told["ci_low"] == told["ci_high"] == 1.0
-    assert "it fails without an earthquake" in told["warnings"][0]
+    document = shell.json("predict", *steep)
+    assert document["probability"] == document["ci_low"] == document["ci_high"] == 1.0
+    assert "it fails without an earthquake" in document["warnings"][0]
     assert "rocking is free-standing" in rejects("predict", *steep, "--kind", "free")
 
 
 def test_a_rejection_of_measures_names_options(rejects: Rejects) -> None:
-    told = rejects("predict", "--p2", "3", "--kr", "0.1", "--kind", "rocking", "--pga", "0.5")
-    assert "works with --pga: give --pga and --magnitude, or --pgv, or --sa10" in told
+    message = rejects("predict", "--p2", "3", "--kr", "0.1", "--kind", "rocking", "--pga", "0.5")
+    assert "works with --pga: give --pga and --magnitude, or --pgv, or --sa10" in message

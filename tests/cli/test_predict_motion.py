@@ -17,18 +17,18 @@ BLOCK = ("--p2", "3", "--kr", "0.05")
 
 def test_unknown_polarity_gives_both_and_their_mean(shell: Shell, record: Path) -> None:
     both = shell.json("predict", *BLOCK, "--motion", record)
-    one = {
+    single = {
         polarity: shell.json("predict", *BLOCK, "--motion", record, "--polarity", polarity)
         for polarity in ("forward", "reverse")
     }
     assert set(both["polarities"]) == {"forward", "reverse"}
-    for polarity, answer in one.items():
+    for polarity, answer in single.items():
         assert both["polarities"][polarity]["probability"] == answer["probability"]
         assert answer["term"] == "xp"
         assert "polarities" not in answer
-    mean = 0.5 * (one["forward"]["probability"] + one["reverse"]["probability"])
+    mean = 0.5 * (single["forward"]["probability"] + single["reverse"]["probability"])
     assert both["probability"] == mean
-    assert one["forward"]["intensity_m_s"] != one["reverse"]["intensity_m_s"]
+    assert single["forward"]["intensity_m_s"] != single["reverse"]["intensity_m_s"]
     table = shell("predict", *BLOCK, "--motion", record).stdout
     assert "forward" in table
     assert "reverse" in table
@@ -37,10 +37,10 @@ def test_unknown_polarity_gives_both_and_their_mean(shell: Shell, record: Path) 
 def test_the_shell_has_the_bits_of_python(shell: Shell, record: Path) -> None:
     motion = rbfrag.read_motions(record)[0]
     for kr in (0.02, 0.05, 0.3):
-        told = shell.json("predict", "--p2", "3", "--kr", kr, "--motion", record)
+        document = shell.json("predict", "--p2", "3", "--kr", kr, "--motion", record)
         answer = rbfrag.predict(3.0, kr, motion=motion, db=REFERENCE)
         for name in ("probability", "ci_low", "ci_high", "y_m_s"):
-            assert told[name] == getattr(answer, name)
+            assert document[name] == getattr(answer, name)
     spectrum = shell.json("spectrum", record, "--p2", "3", "--polarity", "forward")
     forward = shell.json("predict", *BLOCK, "--motion", record, "--polarity", "forward")
     values = spectrum if isinstance(spectrum, dict) else spectrum[0]

@@ -16,7 +16,7 @@ from tests.cli.conftest import Rejects, Shell
 from tests.fragility.test_overturning import T2, stored
 
 MOTION = ("--pgv", "0.6", "--pga", "0.5", "--db", "own.db")
-ASKED = ("predict", "--kind", "rocking")
+COMMAND = ("predict", "--kind", "rocking")
 
 
 @pytest.fixture(autouse=True)
@@ -26,35 +26,35 @@ def database(shell: Shell) -> None:
 
 
 def test_numbers_are_answered_as_from_python(shell: Shell) -> None:
-    told = shell.json(*ASKED, "--p2", "7", "--kr", "0.2", "--restitution", "0.9", *MOTION,
+    document = shell.json(*COMMAND, "--p2", "7", "--kr", "0.2", "--restitution", "0.9", *MOTION,
                       "--component", "single")  # fmt: skip
-    own = predict(
+    expected = predict(
         7.0, 0.2, kind="rocking", restitution=0.9, pgv_m_s=0.6, pga_g=0.5, db="own.db",
         component="single",
     )  # fmt: skip
-    assert told.pop("answers")[0]["probability"] == own.probability
-    assert told == own.as_dict()
-    assert (told["kind"], told["failure"]) == ("rocking", "overturning")
+    assert document.pop("answers")[0]["probability"] == expected.probability
+    assert document == expected.as_dict()
+    assert (document["kind"], document["failure"]) == ("rocking", "overturning")
 
 
 def test_a_rectangle_is_its_numbers(shell: Shell) -> None:
     block = Block.rectangle(2.0, 0.5)
-    numbers = shell.json(*ASKED, "--p2", repr(block.p2), "--kr", "0.25", *MOTION)
+    numbers = shell.json(*COMMAND, "--p2", repr(block.p2), "--kr", "0.25", *MOTION)
     shape = ("--height", "2", "--width", "0.5")
-    for asked in ((*ASKED, *shape), ("predict", *shape, "--no-back")):
-        told = shell.json(*asked, *MOTION)
-        assert told["kind"] == "rocking"
-        assert told["probability"] == pytest.approx(numbers["probability"], rel=1e-9)
-        assert any("assumed not to slip" in text for text in told["warnings"])
-    factor = shell.json(*ASKED, *shape, "--restitution", "0.8", *MOTION)
+    for inputs in ((*COMMAND, *shape), ("predict", *shape, "--no-back")):
+        document = shell.json(*inputs, *MOTION)
+        assert document["kind"] == "rocking"
+        assert document["probability"] == pytest.approx(numbers["probability"], rel=1e-9)
+        assert any("assumed not to slip" in text for text in document["warnings"])
+    factor = shell.json(*COMMAND, *shape, "--restitution", "0.8", *MOTION)
     assert factor["probability"] < numbers["probability"]
 
 
 def test_a_block_that_stands_unevenly_is_that_of_its_weaker_sense(shell: Shell) -> None:
     shape = ("--alpha1", "-12", "--alpha3", "16", "--r3", "1", "--beta", "2", "--phi", "40")
-    even = shell.json(*ASKED, *shape, *MOTION)
+    even = shell.json(*COMMAND, *shape, *MOTION)
     assert not any("weaker sense" in text for text in even["warnings"])
-    level = shell.json(*ASKED, *shape[:6], "--beta", "0", "--phi", "40", *MOTION)
+    level = shell.json(*COMMAND, *shape[:6], "--beta", "0", "--phi", "40", *MOTION)
     assert any("weaker sense, backward" in text for text in level["warnings"])
     kr = math.tan(math.radians(12.0))
     assert level["y_m_s"] == pytest.approx(
@@ -67,27 +67,27 @@ def test_tables_answer_as_single_blocks(shell: Shell) -> None:
     Path("blocks.csv").write_text(
         "height_m,width_m,dip_deg,restitution\n2,0.5,0,\n2,0.5,3,\n2,0.5,-3,0.8\n2,3.2,0,\n"
     )
-    shell(*ASKED, "--batch", "blocks.csv", "--out", "answers.csv", *MOTION)
+    shell(*COMMAND, "--batch", "blocks.csv", "--out", "answers.csv", *MOTION)
     with Path("answers.csv").open() as file:
         rows = list(csv.DictReader(file))
     for row in rows[:3]:
-        own = ("--restitution", row["restitution"]) if row["restitution"] else ()
+        expected = ("--restitution", row["restitution"]) if row["restitution"] else ()
         shape = ("--height", row["height_m"], "--width", row["width_m"], "--dip", row["dip_deg"])
-        told = shell.json(*ASKED, *shape, *own, *MOTION)
-        assert float(row["probability"]) == pytest.approx(told["probability"], rel=1e-12)
+        document = shell.json(*COMMAND, *shape, *expected, *MOTION)
+        assert float(row["probability"]) == pytest.approx(document["probability"], rel=1e-12)
     assert rows[3]["probability"] == ""
     assert "comes to rest at its first impact" in rows[3]["reason"]
 
 
 def test_a_column_of_restitution_with_empty_cells_is_that_of_each_block(shell: Shell) -> None:
     Path("blocks.csv").write_text("p2_1_s2,kr,restitution\n7,0.2,\n7,0.2,0.9\n7,0.2,0\n7,0.2,1.2\n")
-    shell(*ASKED, "--batch", "blocks.csv", "--out", "answers.csv", *MOTION)
+    shell(*COMMAND, "--batch", "blocks.csv", "--out", "answers.csv", *MOTION)
     with Path("answers.csv").open() as file:
-        formula, stated, rests, wrong = csv.DictReader(file)
-    own = shell.json(*ASKED, "--p2", "7", "--kr", "0.2", *MOTION)
-    assert float(formula["probability"]) == pytest.approx(own["probability"], rel=1e-12)
-    given = shell.json(*ASKED, "--p2", "7", "--kr", "0.2", "--restitution", "0.9", *MOTION)
-    assert float(stated["probability"]) == pytest.approx(given["probability"], rel=1e-12)
+        formula, value, rests, wrong = csv.DictReader(file)
+    expected = shell.json(*COMMAND, "--p2", "7", "--kr", "0.2", *MOTION)
+    assert float(formula["probability"]) == pytest.approx(expected["probability"], rel=1e-12)
+    inputs = shell.json(*COMMAND, "--p2", "7", "--kr", "0.2", "--restitution", "0.9", *MOTION)
+    assert float(value["probability"]) == pytest.approx(inputs["probability"], rel=1e-12)
     for row in (rests, wrong):
         assert row["probability"] == ""
         assert "restitution must be above 0 and up to 1" in row["reason"]
@@ -97,13 +97,13 @@ def test_draws_of_a_scanned_rock_are_one_block(shell: Shell) -> None:
     Path("rock.csv").write_text(
         "block_id,azimuth_deg,p2_1_s2,kr,restitution\nr0,0,17,0.2,0.9\nr90,90,16,0.3,0.8\n"
     )
-    told = shell.json(*ASKED, "--block-draws", "rock.csv", *MOTION)
-    each = [
+    document = shell.json(*COMMAND, "--block-draws", "rock.csv", *MOTION)
+    separate = [
         predict(p2, kr, kind="rocking", restitution=e, pgv_m_s=0.6, pga_g=0.5, db="own.db")
         for p2, kr, e in ((17.0, 0.2, 0.9), (16.0, 0.3, 0.8))
     ]
-    mean = 0.5 * (each[0].probability + each[1].probability)
-    assert told["probability"] == pytest.approx(mean, rel=1e-12)
+    mean = 0.5 * (separate[0].probability + separate[1].probability)
+    assert document["probability"] == pytest.approx(mean, rel=1e-12)
 
 
 @pytest.mark.parametrize(
@@ -119,7 +119,7 @@ def test_draws_of_a_scanned_rock_are_one_block(shell: Shell) -> None:
 def test_what_is_no_free_standing_block_is_rejected(
     rejects: Rejects, more: tuple[str, ...], words: str
 ) -> None:
-    assert words in rejects(*ASKED, *more, *MOTION)
+    assert words in rejects(*COMMAND, *more, *MOTION)
 
 
 def test_block_names_the_command_for_a_block_that_stands_free(

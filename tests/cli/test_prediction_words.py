@@ -1,4 +1,4 @@
-"""What `rbfrag predict` says in words of P, its interval and one single earthquake."""
+"""Words of `rbfrag predict` for P, its interval and a single earthquake."""
 
 from __future__ import annotations
 
@@ -16,12 +16,14 @@ from tests.cli.conftest import Shell
 
 def answer(p: float, low: float, high: float, **values: Any) -> Prediction:
     numbers = {"p2": 7.1372, "kr": 0.25, "pgv_m_s": 0.6, "pga_g": 0.5}
-    own: dict[str, Any] = {
+    block_inputs: dict[str, Any] = {
         "kind": "toppling", "failure": "toppling", "model": "m", "data": "a file", "term": "pgv_kr",
         "method": "bounded", "in_domain": True, "event_low": None, "event_high": None,
         "how": "model m", "level": 0.95, "y_m_s": 0.9, "intensity_m_s": 0.6, "inputs": numbers,
     }  # fmt: skip
-    return Prediction(**{**own, "probability": p, "ci_low": low, "ci_high": high, **values})
+    return Prediction(
+        **{**block_inputs, "probability": p, "ci_low": low, "ci_high": high, **values}
+    )
 
 
 def test_the_headline_is_the_probability_with_its_interval() -> None:
@@ -45,34 +47,34 @@ def test_the_headline_is_the_probability_with_its_interval() -> None:
 
 
 def test_labelled_lines_say_what_was_asked_and_which_model_answers() -> None:
-    found = dict(answer(0.2, 0.1, 0.3).lines())
-    assert found["Shaking"] == "PGV 0.6 m/s, PGA 0.5 g"
-    assert found["Block"].startswith("p² = 7.14 s⁻², k_r = 0.25; assumed backed by a rock face")
-    assert found["Model"] == "m, a file; inputs within the fitted range"
+    values = dict(answer(0.2, 0.1, 0.3).lines())
+    assert values["Shaking"] == "PGV 0.6 m/s, PGA 0.5 g"
+    assert values["Block"].startswith("p² = 7.14 s⁻², k_r = 0.25; assumed backed by a rock face")
+    assert values["Model"] == "m, a file; inputs within the fitted range"
     about = {"pgv_m_s": {"median": 0.17, "sigma": 0.67, "tau": None}}
-    found = dict(
+    values = dict(
         answer(0.2, 0.1, 0.3, shaking=about, sites=5, event_low=0.0, event_high=0.1,
                in_domain=False, block_sd=0.12).lines()
     )  # fmt: skip
-    assert found["Shaking"] == (
+    assert values["Shaking"] == (
         "PGA 0.5 g, median PGV 0.17 m/s, σ_ln 0.67; P is the mean over this distribution"
     )
-    assert found["Sites"] == (
+    assert values["Sites"] == (
         "in one earthquake at 5 such sites, 0–10 % of the blocks fail (95 % prediction interval)"
     )
-    assert found[""] == "block uncertainty: standard deviation of P 0.12"
-    assert found["Model"].endswith("inputs outside the fitted range")
+    assert values[""] == "block uncertainty: standard deviation of P 0.12"
+    assert values["Model"].endswith("inputs outside the fitted range")
 
 
 def test_a_scenario_is_named_with_its_mechanism_and_ground_motion_model() -> None:
     inputs = {"height_m": 2.0, "width_m": 0.4, "magnitude": 6.5, "rjb_km": 5.0, "vs30_m_s": 500.0}
-    found = dict(answer_block(inputs, mechanism="reverse").lines())
-    assert found["Shaking"] == (
+    values = dict(answer_block(inputs, mechanism="reverse").lines())
+    assert values["Shaking"] == (
         "magnitude 6.5, reverse, R_JB 5 km, Vs30 500 m/s (BSSA14): median PGV 0.34 m/s (RotD50), "
         "σ_ln 0.67 of a single component; P is the mean over this distribution"
     )
-    found = dict(answer_block({**inputs, "amplification": 1.5}).lines())
-    assert found["Shaking"].startswith(
+    values = dict(answer_block({**inputs, "amplification": 1.5}).lines())
+    assert values["Shaking"].startswith(
         "magnitude 6.5, mechanism unspecified, R_JB 5 km, Vs30 500 m/s, amplification 1.5 (BSSA14)"
     )
 
@@ -85,15 +87,15 @@ def test_the_block_is_named_with_how_it_is_assumed_to_stand() -> None:
 
 
 @pytest.mark.parametrize(
-    ("share", "said"),
+    ("share", "message"),
     [
         (0.0, "0 %"), (1e-9, "<0.01 %"), (3e-4, "0.030 %"), (0.0123, "1.2 %"),
         (0.1161, "12 %"), (0.996, "99.6 %"), (0.99995, ">99.99 %"), (1.0, "100 %"),
         (199 / 200, "99.5 %"), (0.9949, "99 %"), (0.0996, "10 %"), (0.0994, "9.9 %"),
     ],
 )  # fmt: skip
-def test_percent_has_the_digits_of_an_engineer(share: float, said: str) -> None:
-    assert percent(share) == said
+def test_percent_has_the_digits_of_an_engineer(share: float, message: str) -> None:
+    assert percent(share) == message
 
 
 def test_an_interval_that_says_no_more_is_left_out() -> None:
@@ -103,7 +105,7 @@ def test_an_interval_that_says_no_more_is_left_out() -> None:
 
 
 @pytest.mark.parametrize(
-    ("term", "method", "said"),
+    ("term", "method", "message"),
     [
         ("pgv_kr", "bounded", "PGV, size-dependent"),
         ("pgv", "wls", "PGV, wls"),
@@ -113,20 +115,20 @@ def test_an_interval_that_says_no_more_is_left_out() -> None:
         ("pgv, pga", "bounded", "two names"),
     ],
 )
-def test_models_have_names_that_people_say(term: str, method: str, said: str) -> None:
-    assert describe.model({"term": term, "method": method, "model": "two names"}) == said
+def test_models_have_names_that_people_say(term: str, method: str, message: str) -> None:
+    assert describe.model({"term": term, "method": method, "model": "two names"}) == message
 
 
 def test_models_of_the_reference_are_told_apart(shell: Shell) -> None:
     rows = shell.json("models", "list")
     of = [(row["kind"], describe.model({**row, "model": row["name"]})) for row in rows]
-    same = [each for each in of if of.count(each) > 1]
+    same = [item for item in of if of.count(item) > 1]
     assert {kind for kind, _ in same} == {"slumping"}  # which differ by what counts as failure
 
 
 def test_other_suited_models_are_listed_and_none_is_said_to_be_wrong(shell: Shell) -> None:
-    asked = ["--p2", "3", "--kr", "0.1", "--pgv", "0.6", "--pga", "0.5", "--tm", "0.5"]
-    document = shell.json("predict", *asked)
+    command = ["--p2", "3", "--kr", "0.1", "--pgv", "0.6", "--pga", "0.5", "--tm", "0.5"]
+    document = shell.json("predict", *command)
     assert len(document["answers"]) > 3
     assert document["answers"][0]["recommended"]
     assert not any("agree" in text for text in document["warnings"])

@@ -11,7 +11,7 @@ from importlib import import_module
 import pytest
 from numba import njit
 
-from rbfrag.campaign.executors.local import run_locally
+from rbfrag.campaign.executors import run_locally
 from rbfrag.cli import output
 from rbfrag.cli.output import ProgressBar
 
@@ -27,8 +27,8 @@ def test_lines_where_there_is_no_terminal(
     now = iter((0.0, 1.0, 6.0, 10.0, 10.0))
     monkeypatch.setattr(output.time, "monotonic", lambda: next(now))
     with ProgressBar("simulate", "combinations") as bar:
-        for done in (10, 12, 22, 30):
-            bar.show(done, 30, "10 stored before")
+        for completed in (10, 12, 22, 30):
+            bar.show(completed, 30, "10 stored before")
     captured = capsys.readouterr()
     assert captured.out == ""
     assert captured.err.splitlines() == [
@@ -47,8 +47,8 @@ def test_a_bar_with_rate_and_time_left_on_a_terminal(monkeypatch: pytest.MonkeyP
     monkeypatch.setenv("COLUMNS", "120")
     monkeypatch.setattr(sys, "stderr", terminal)
     with ProgressBar("simulate", "combinations") as bar:
-        for done in (5, 15, 25):
-            bar.show(done, 25)
+        for completed in (5, 15, 25):
+            bar.show(completed, 25)
     shown = terminal.getvalue()
     assert "simulate:" in shown
     assert "25/25" in shown
@@ -72,12 +72,12 @@ print(double(1), double(2))
 
 
 def test_compiling_is_said_once_and_on_standard_error() -> None:
-    done = subprocess.run(
+    process = subprocess.run(
         [sys.executable, "-c", PROGRAM], capture_output=True, text=True, check=True,
         env={**os.environ, "PYTHONPATH": os.pathsep.join(p for p in sys.path if p)},
     )  # fmt: skip
-    assert done.stdout == "2 4\n"
-    assert done.stderr == "compiling the kernels for this machine; this happens once\n"
+    assert process.stdout == "2 4\n"
+    assert process.stderr == "compiling the kernels for this machine; this happens once\n"
 
 
 def test_of_several_workers_one_says_that_it_compiles(capfd: pytest.CaptureFixture[str]) -> None:

@@ -1,4 +1,4 @@
-"""What the command line answers and draws, from Python by the same functions."""
+"""Answers and figures of the command line, from Python by the same functions."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ MASS = Path(__file__).parents[2] / "docs" / "examples" / "rockmass.toml"
 def test_a_rock_mass_is_answered_as_by_the_shell(shell: Shell, tmp_path: Path) -> None:
     record = write_at2(tmp_path / "record.AT2", shaking(3))
     answer = rbfrag.rockmass(MASS, n=60, motion=record, scales=(0.5, 1.0), jobs=1)
-    asked = ["--n", "60", "--motion", record, "--scales", "0.5,1", "--jobs", "1"]
-    assert answer.as_dict() == shell.json("rockmass", MASS, *asked)
+    command = ["--n", "60", "--motion", record, "--scales", "0.5,1", "--jobs", "1"]
+    assert answer.as_dict() == shell.json("rockmass", MASS, *command)
     assert len(answer.to_frame()) == 2 * 60
     answer = rbfrag.rockmass(str(MASS), n=60, pgv_m_s=0.6, sa_g={1.0: 0.4})
-    asked = ["--n", "60", "--pgv", "0.6", "--sa10", "0.4"]
-    assert answer.as_dict() == shell.json("rockmass", MASS, *asked)
+    command = ["--n", "60", "--pgv", "0.6", "--sa10", "0.4"]
+    assert answer.as_dict() == shell.json("rockmass", MASS, *command)
     with pytest.raises(rbfrag.InputError, match="motion cannot be combined with pgv_m_s"):
         rbfrag.rockmass(MASS, pgv_m_s=0.6, motion=record)
     assert "\n" not in repr(answer)
@@ -38,9 +38,9 @@ def test_a_map_is_answered_as_by_the_shell(shell: Shell, tmp_path: Path) -> None
     grid = tmp_path / "grid.xml"
     grid.write_text(GRID, encoding="utf-8")
     answer = rbfrag.shakemap(grid, 3.0, 0.1, component="single")
-    asked = ["--p2", "3", "--kr", "0.1", "--component", "single", "--out", "map.csv"]
-    told = shell.json("shakemap", grid, *asked)
-    assert answer.as_dict() == {name: told[name] for name in told if name != "file"}
+    command = ["--p2", "3", "--kr", "0.1", "--component", "single", "--out", "map.csv"]
+    document = shell.json("shakemap", grid, *command)
+    assert answer.as_dict() == {name: document[name] for name in document if name != "file"}
     frame = answer.to_frame()
     columns = pd.DataFrame({"p2_1_s2": [3.0], "kr": [0.1]})
     same = rbfrag.shakemap(grid, blocks=columns, component="single").to_frame()
@@ -57,10 +57,10 @@ def test_functions_for_other_tools_are_those_of_the_shell(
 ) -> None:
     file, other = tmp_path / f"python{ending}", tmp_path / f"shell{ending}"
     answer = getattr(rbfrag.export, name)(file, 3.0, 0.1)
-    told = shell.json("export", name, "--p2", "3", "--kr", "0.1", "--out", other)
+    document = shell.json("export", name, "--p2", "3", "--kr", "0.1", "--out", other)
     assert file.read_bytes() == other.read_bytes()
-    assert told["model"] == answer.model
-    assert answer.as_dict().keys() == told.keys()
+    assert document["model"] == answer.model
+    assert answer.as_dict().keys() == document.keys()
 
 
 def test_figures_are_pictures_without_a_file(tmp_path: Path) -> None:
@@ -84,5 +84,5 @@ def test_asking_for_figures_and_exports_loads_no_matplotlib() -> None:
         "import sys, rbfrag; rbfrag.plot; rbfrag.export; rbfrag.shakemap; rbfrag.rockmass;"
         "print([name for name in ('matplotlib', 'pyogrio') if name in sys.modules])"
     )
-    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
-    assert done.stdout.strip() == "[]", done.stderr
+    process = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
+    assert process.stdout.strip() == "[]", process.stderr

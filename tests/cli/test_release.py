@@ -10,7 +10,7 @@ import pytest
 
 import rbfrag
 from rbfrag.errors import InputError
-from rbfrag.exchange.release import write_release_rates
+from rbfrag.exchange.rate_tables import write_release_rates
 from tests.cli.conftest import Shell
 
 CURVE = "pgv_m_s,annual_rate\n0.05,0.03\n0.1,0.012\n0.2,0.004\n0.5,0.0008\n1,0.00017\n2,0.00002\n"
@@ -51,8 +51,8 @@ def released(path: Path) -> list[dict[str, str]]:
 def test_table_of_release(shell: Shell) -> None:
     Path("curve.csv").write_text(CURVE)
     Path("blocks.csv").write_text(BLOCKS)
-    asked = ("hazard", "curve.csv", "--blocks", "blocks.csv", "--component", "rotd50")
-    rates = shell.json(*asked, "--density", "2500", "--release", "release.csv")["blocks"]
+    command = ("hazard", "curve.csv", "--blocks", "blocks.csv", "--component", "rotd50")
+    rates = shell.json(*command, "--density", "2500", "--release", "release.csv")["blocks"]
     by_plane, by_sides, plain = released(Path("release.csv"))
     # the wedge has no rate, and is left out
     assert [row["block_id"] for row in rates] == ["A", "B", "wedge", "C"]
@@ -114,14 +114,14 @@ def test_one_block_in_the_shell_has_its_sides(shell: Shell) -> None:
 
 
 def test_cohesion_of_all_rows_of_a_table(shell: Shell) -> None:
-    """What holds for all blocks is no column: it was rejected as an array of numbers."""
+    """A value for all blocks is not a column: it was rejected as an array of numbers."""
     Path("curve.csv").write_text(CURVE)
     Path("blocks.csv").write_text("block_id,height_m,width_m,phi_deg\nB,2,0.5,10\nC,2,0.4,10\n")
-    asked = ("hazard", "curve.csv", "--component", "rotd50")
+    command = ("hazard", "curve.csv", "--component", "rotd50")
     bond = ("--cohesion", "20000", "--density", "2500")
-    first = shell.json(*asked, "--blocks", "blocks.csv", *bond)["blocks"][0]
-    one = shell.json(*asked, "--height", "2", "--width", "0.5", "--phi", "10", *bond)
-    assert first["annual_rate"] == pytest.approx(one["annual_rate"], rel=1e-9)
+    first = shell.json(*command, "--blocks", "blocks.csv", *bond)["blocks"][0]
+    single = shell.json(*command, "--height", "2", "--width", "0.5", "--phi", "10", *bond)
+    assert first["annual_rate"] == pytest.approx(single["annual_rate"], rel=1e-9)
     # without the bond it slides
-    said = shell(*asked, "--blocks", "blocks.csv", "--density", "2500", expect=2).stderr
-    assert "slides" in said
+    message = shell(*command, "--blocks", "blocks.csv", "--density", "2500", expect=2).stderr
+    assert "slides" in message

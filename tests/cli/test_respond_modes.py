@@ -90,8 +90,8 @@ def test_a_film_that_cannot_be_made_is_rejected_before_anything_is_written(
     rejects: Rejects, record: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("PATH", "")
-    asked = ("respond", record, *SLUMP, "--csv", "m.csv", "--film", "m.mp4")
-    assert "use .gif or .html" in rejects(*asked)
+    command = ("respond", record, *SLUMP, "--csv", "m.csv", "--film", "m.mp4")
+    assert "use .gif or .html" in rejects(*command)
     assert list(tmp_path.iterdir()) == [record]
 
 
@@ -133,18 +133,18 @@ def test_a_free_standing_rectangle_needs_no_friction(
     shell: Shell, rejects: Rejects, record: Path
 ) -> None:
     sides = ("--height", "1.2", "--width", "0.3")
-    free = shell("respond", record, *sides, "--no-back", "--json")
-    assert "assumed not to slip" in free.stdout
-    asked = shell.json("respond", record, *sides, "--kind", "rocking")
-    assert asked["kind"] == "rocking"
+    free_standing = shell("respond", record, *sides, "--no-back", "--json")
+    assert "assumed not to slip" in free_standing.stdout
+    inputs = shell.json("respond", record, *sides, "--kind", "rocking")
+    assert inputs["kind"] == "rocking"
     less = shell.json("respond", record, *sides, "--kind", "rocking", "--restitution", "0.6")
-    assert less["peak_theta_rad"] != asked["peak_theta_rad"]
+    assert less["peak_theta_rad"] != inputs["peak_theta_rad"]
     by_numbers = shell.json(
         "respond", record, "--kind", "rocking", "--kr", "0.25", "--p2",
         repr(0.75 * 9.80665 / (0.5 * math.hypot(1.2, 0.3))),
     )  # fmt: skip
-    assert by_numbers["outcome"] == asked["outcome"]
-    assert by_numbers["impacts"] == asked["impacts"]
+    assert by_numbers["outcome"] == inputs["outcome"]
+    assert by_numbers["impacts"] == inputs["impacts"]
     leans = ("--kind", "rocking", "--dip", "15")
     assert "overturns forward over its toe at rest" in rejects("respond", record, *sides, *leans)
     words = "restitution = 0: give the coefficient"
@@ -183,9 +183,9 @@ def test_a_block_file_with_water_is_answered(shell: Shell, rejects: Rejects, rec
     alike = shell.json("respond", record, *dry)
     assert alike["drained"] is None
     assert wet["peak_displacement_m"] > alike["peak_displacement_m"]
-    left = shell.json("respond", record, "--block", "wet.toml", "--phi-residual", "36")
-    assert any("after its first slip" in text for text in left["warnings"])
-    assert left["peak_displacement_m"] > wet["peak_displacement_m"]
+    remaining = shell.json("respond", record, "--block", "wet.toml", "--phi-residual", "36")
+    assert any("after its first slip" in text for text in remaining["warnings"])
+    assert remaining["peak_displacement_m"] > wet["peak_displacement_m"]
     # how far slides go on a level plane does not depend on the water
     searched = shell.json("critical", record, "--block", "wet.toml")
     assert searched["kind"] == "sliding"
@@ -205,8 +205,8 @@ def test_toe_and_modes_are_in_the_answer(shell: Shell, record: Path) -> None:
 
 def test_yields_over_a_rotation_are_dry(rejects: Rejects) -> None:
     Path("wet.toml").write_text(BLOCK_FILE)
-    said = rejects("plot", "rotation", "--block", "wet.toml", "--out", "a.png")
-    assert "cannot be combined with the yield over a rotation" in said
+    message = rejects("plot", "rotation", "--block", "wet.toml", "--out", "a.png")
+    assert "cannot be combined with the yield over a rotation" in message
 
 
 def test_the_headline_says_whether_the_block_fails(shell: Shell, record: Path) -> None:

@@ -65,15 +65,15 @@ def stored_model(tmp_path: Path) -> None:
 
 def test_json_is_the_python_answer(shell: Shell, mass: Path) -> None:
     answer = shell.json("rockmass", mass, "--n", "3000", "--seed", "5")
-    made = read_rock_mass(mass).realise(3000, 5)
-    counts = mode_counts(made)
+    result = read_rock_mass(mass).realise(3000, 5)
+    counts = mode_counts(result)
     assert (answer["realisations"], answer["seed"]) == (3000, 5)
-    assert answer["blocks"] == made.n_blocks
+    assert answer["blocks"] == result.n_blocks
     assert {m: a["count"] for m, a in answer["modes"].items()} == {
         m: c.count for m, c in counts.items()
     }
     assert answer["modes"]["topple"]["yield_g"] is None
-    assert [c["pga_g"] for c in answer["crossings"]] == [c.pga_g for c in crossings(made)]
+    assert [c["pga_g"] for c in answer["crossings"]] == [c.pga_g for c in crossings(result)]
     assert answer["scenario"] is None
     assert answer["variables"]["base.dip_deg"] == "normal, mean 20, sd 5, not truncated"
     assert answer == shell.json("rockmass", mass, "--n", "3000", "--seed", "5")
@@ -91,17 +91,17 @@ def test_text_names_shares_crossing_and_impossible(shell: Shell, mass: Path) -> 
 def test_scenario_covers_what_it_says(shell: Shell, steep: Path) -> None:
     answer = shell.json("rockmass", steep, "--pgv", "1.0", "--level", "0.9")
     expected = scenario(read_rock_mass(steep).realise(), {"pgv_m_s": 1.0}, level=0.9)
-    found = answer["scenario"]
-    assert (found["model"], found["term"], found["level"]) == ("line", "pgv", 0.9)
-    assert found["pgv_m_s"] == 1.0
-    total = found["covered_only"]
+    document = answer["scenario"]
+    assert (document["model"], document["term"], document["level"]) == ("line", "pgv", 0.9)
+    assert document["pgv_m_s"] == 1.0
+    total = document["covered_only"]
     assert total["probability"] == expected.covered.probability
     assert total["standard_error"] == expected.covered.standard_error
     assert 0.0 < total["probability"] < 1.0
-    assert found["modes"]["topple"]["has_model"]
-    assert not found["modes"]["slide"]["has_model"]
-    assert found["modes"]["slide"]["probability"] is None
-    assert found["uncovered_share"].keys() >= {"slide"}
+    assert document["modes"]["topple"]["has_model"]
+    assert not document["modes"]["slide"]["has_model"]
+    assert document["modes"]["slide"]["probability"] is None
+    assert document["uncovered_share"].keys() >= {"slide"}
     result = shell("rockmass", steep, "--pgv", "1.0")
     assert "covered blocks only" in result.stdout
     assert "slide: " in result.stdout
@@ -135,18 +135,18 @@ def test_the_table_holds_the_blocks_with_their_answers(
     shell: Shell, steep: Path, tmp_path: Path, kind: str
 ) -> None:
     out = tmp_path / f"blocks.{kind}"
-    asked = ("--pgv", "1.0", "--out", out, "--plot", tmp_path / "a.svg")
-    warnings = shell.json("rockmass", steep, *asked)["warnings"]
+    command = ("--pgv", "1.0", "--out", out, "--plot", tmp_path / "a.svg")
+    warnings = shell.json("rockmass", steep, *command)["warnings"]
     if kind == "csv":
         notes = json.loads(Path(f"{out}-metadata.json").read_text("utf-8"))["notes"]
         assert [note["text"] for note in notes] == warnings
-    made = read_rock_mass(steep).realise()
+    result = read_rock_mass(steep).realise()
     names = ("block_id", "p2_1_s2", "kr", "weight", "pgv_m_s", "probability")
     columns = read_columns(out, names)
     assert columns["block_id"].tolist() == list(range(1, 401))
-    assert np.array_equal(columns["kr"], made.kr_at_rest, equal_nan=True)
+    assert np.array_equal(columns["kr"], result.kr_at_rest, equal_nan=True)
     assert set(columns["pgv_m_s"]) == {1.0}
-    answer = scenario(made, {"pgv_m_s": 1.0})
+    answer = scenario(result, {"pgv_m_s": 1.0})
     assert np.array_equal(columns["probability"], answer.probability, equal_nan=True)
     assert (tmp_path / "a.svg").read_text().startswith("<?xml")
 
@@ -185,7 +185,7 @@ def test_a_block_is_drawn(shell: Shell) -> None:
         (("mass.toml", "--pgv", "nan"), "--pgv = nan"),
         (("mass.toml", "--pgv", "-1"), "--pgv = -1"),
         (("mass.toml", "--model", "line"), "--model requires an intensity measure"),
-        (("mass.toml", "--db", "a.db"), "--db requires a motion or an intensity measure"),
+        (("mass.toml", "--db", "a.db"), "--db requires --motion or an intensity measure"),
         (("mass.toml", "--pgv", "1", "--level", "2"), "level = 2.0"),
         (("mass.toml", "--out", "a.xls"), "unsupported suffix '.xls'; use .csv, .xlsx, .parquet"),
         (("mass.toml", "--out", "none/a.csv"), "create the folder none"),

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from rbfrag.motions.readers import read_motion
-from rbfrag.rockmasses.failures import failures
+from rbfrag.rockmasses.counts import failures
 from rbfrag.rockmasses.file import read_rock_mass
 from rbfrag.rockmasses.shaking import FailureLimits, plan_shaking, run_blocks
 from tests.block_tables import read_columns
@@ -25,16 +25,16 @@ def record(tmp_path: Path) -> Path:
 
 
 def test_shares_table_and_figure(shell: Shell, record: Path, tmp_path: Path) -> None:
-    asked = (
+    command = (
         "rockmass", "mass.toml", "--n", "60", "--motion", record, "--reverse",
         "--scales", "2,0.5,1", "--displacement", "0.02", "--rotation", "1", "--level", "0.9",
     )  # fmt: skip
-    answer = shell.json(*asked, "--out", "blocks.csv", "--plot", "shares.png")
+    answer = shell.json(*command, "--out", "blocks.csv", "--plot", "shares.png")
     assert answer["scenario"] is None
-    told = answer["shaking"]
-    assert told["polarity"] == "reverse"
-    assert (told["displacement_limit_m"], told["rotation_limit_deg"]) == (0.02, 1.0)
-    assert [each["scale"] for each in told["scales"]] == [0.5, 1.0, 2.0]
+    document = answer["shaking"]
+    assert document["polarity"] == "reverse"
+    assert (document["displacement_limit_m"], document["rotation_limit_deg"]) == (0.02, 1.0)
+    assert [scale["scale"] for scale in document["scales"]] == [0.5, 1.0, 2.0]
     plan = plan_shaking(
         read_rock_mass(EXAMPLE).realise(60),
         read_motion(record),
@@ -43,19 +43,19 @@ def test_shares_table_and_figure(shell: Shell, record: Path, tmp_path: Path) -> 
         limits=FailureLimits(0.02, 1.0),
     )
     outcomes = plan.gathered(map(run_blocks, plan.work()))
-    for each, found in zip(told["scales"], failures(outcomes, 0.9), strict=True):
-        assert set(each["modes"]) == {"slide", "slump"}
-        for mode, counted in found.modes.items():
-            assert each["modes"][mode]["fails"] == counted.fails
-            assert each["modes"][mode]["fails_of_all"]["ci_high"] == counted.of_all.high
-        assert each["all"]["fails_of_mode"]["share"] == each["all"]["fails"] / 60
-    assert told["scales"][2]["all"]["fails"] > 0
+    for scale, result in zip(document["scales"], failures(outcomes, 0.9), strict=True):
+        assert set(scale["modes"]) == {"slide", "slump"}
+        for mode, counted in result.modes.items():
+            assert scale["modes"][mode]["fails"] == counted.fails
+            assert scale["modes"][mode]["fails_of_all"]["ci_high"] == counted.of_all.high
+        assert scale["all"]["fails_of_mode"]["share"] == scale["all"]["fails"] / 60
+    assert document["scales"][2]["all"]["fails"] > 0
     assert not any("not followed" in warning for warning in answer["warnings"])
     rows = read_columns(tmp_path / "blocks.csv", ("scale", "displacement_m"))
     assert rows["scale"].tolist() == [0.5] * 60 + [1.0] * 60 + [2.0] * 60
     assert (tmp_path / "shares.png").stat().st_size > 10_000
     # the same again, and without a figure of the time that it took
-    assert shell.json(*asked) == answer
+    assert shell.json(*command) == answer
 
 
 def test_the_printed_table(shell: Shell, record: Path) -> None:
@@ -70,8 +70,8 @@ def test_the_printed_table(shell: Shell, record: Path) -> None:
 
 def test_a_stored_motion_by_its_number(shell: Shell, record: Path) -> None:
     shell("motions", "add", record, "--raw")
-    asked = ("rockmass", "mass.toml", "--n", "30", "--motion")
-    by_number, by_file = (shell.json(*asked, name)["shaking"] for name in ("1", record))
+    command = ("rockmass", "mass.toml", "--n", "30", "--motion")
+    by_number, by_file = (shell.json(*command, name)["shaking"] for name in ("1", record))
     assert by_number["scales"] == by_file["scales"]
     assert by_number["scales"][0]["all"]["moved"] > 0
 

@@ -45,17 +45,17 @@ def test_one_pulse_counted_by_hand(tmp_path: Path) -> None:
     values = np.zeros(400)
     values[10:31] = 0.4 * (1.0 - np.abs(np.arange(-10, 11)) / 10.0)
     record = write_at2(tmp_path / "pulse.AT2", values, dt_s=DT_S)
-    said = answer(record, "--p2", "0.2", "--kr", "0.1")
-    assert said["outcome"] == "stable"
-    assert said["started_s"] == pytest.approx(12.5 * DT_S)
-    assert said["samples_total"] == 399
+    message = answer(record, "--p2", "0.2", "--kr", "0.1")
+    assert message["outcome"] == "stable"
+    assert message["started_s"] == pytest.approx(12.5 * DT_S)
+    assert message["samples_total"] == 399
     history = respond(GroundMotion(values, DT_S), p2=0.2, kr=0.1, history=True).history
     assert history is not None
     moving = history.time_s[history.theta_rad > 0.0]
     last = math.ceil(moving[-1] / DT_S)
     assert 31 < last < 399
     # it comes to rest between the last node at which it is up and the next
-    assert said["samples_moved"] == last + 1 - 12
+    assert message["samples_moved"] == last + 1 - 12
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -63,15 +63,15 @@ def test_the_count_is_that_of_the_motion_in_time(tmp_path: Path, seed: int) -> N
     record = write_at2(tmp_path / "made.AT2", shaking(seed))
     motion = GroundMotion(shaking(seed).round(12), DT_S)
     for p2, kr in ((3.0, 0.12), (10.0, 0.2), (0.5, 0.05)):
-        said = answer(record, "--p2", str(p2), "--kr", str(kr))
-        assert said["samples_total"] == motion.npts - 1
-        toppled = said["toppled_s"]
+        message = answer(record, "--p2", str(p2), "--kr", str(kr))
+        assert message["samples_total"] == motion.npts - 1
+        toppled = message["toppled_s"]
         until = toppled if isinstance(toppled, float) else math.inf
         counted = counted_in_history(motion, p2, kr, until)
         # an excursion within one interval may rise and fall between the times that are kept
-        assert isinstance(said["samples_moved"], int)
-        assert abs(said["samples_moved"] - counted) <= 1
-        assert 0 < said["samples_moved"] < said["samples_total"]
+        assert isinstance(message["samples_moved"], int)
+        assert abs(message["samples_moved"] - counted) <= 1
+        assert 0 < message["samples_moved"] < message["samples_total"]
 
 
 def test_rest_is_not_integrated(tmp_path: Path) -> None:
@@ -79,8 +79,8 @@ def test_rest_is_not_integrated(tmp_path: Path) -> None:
     short = write_at2(tmp_path / "short.AT2", samples)
     padded = np.concatenate([np.zeros(3000), samples])
     long = write_at2(tmp_path / "long.AT2", padded)
-    one, other = (answer(f, "--p2", "3", "--kr", "0.15") for f in (short, long))
+    single, other = (answer(f, "--p2", "3", "--kr", "0.15") for f in (short, long))
     assert other["samples_total"] == 3000 + samples.size - 1
-    assert (one["samples_moved"], one["steps"]) == (other["samples_moved"], other["steps"])
+    assert (single["samples_moved"], single["steps"]) == (other["samples_moved"], other["steps"])
     never = answer(short, "--p2", "3", "--kr", "5")
     assert (never["samples_moved"], never["steps"]) == (0, 0)

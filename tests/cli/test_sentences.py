@@ -4,17 +4,11 @@ from __future__ import annotations
 
 import pytest
 
-from rbfrag.results.numbers import (
-    annual_rate,
-    annual_rates,
-    return_period,
-    return_periods,
-    rounded,
-)
+from rbfrag.results.numbers import annual_rate, annual_rates, return_period, return_periods, rounded
 
 
 @pytest.mark.parametrize(
-    ("rate", "said"),
+    ("rate", "message"),
     [
         (1.0 / 4158.2, "4,200 years"),
         (1.0 / 847.0, "850 years"),
@@ -23,8 +17,8 @@ from rbfrag.results.numbers import (
         (0.0, "over 100 million years"),
     ],
 )
-def test_return_periods_have_two_digits(rate: float, said: str) -> None:
-    assert return_period(rate) == said
+def test_return_periods_have_two_digits(rate: float, message: str) -> None:
+    assert return_period(rate) == message
 
 
 def test_an_interval_of_return_periods_starts_with_the_shorter() -> None:
@@ -42,8 +36,8 @@ def test_rates_have_two_digits_and_an_exponent_where_they_are_small() -> None:
 
 
 @pytest.mark.parametrize(
-    ("value", "said"),
+    ("value", "message"),
     [(0.1089085, "0.109"), (1234.5, "1,230"), (100.0, "100"), (2.0, "2.00"), (1e-6, "1e-06")],
 )
-def test_three_digits(value: float, said: str) -> None:
-    assert rounded(value) == said
+def test_three_digits(value: float, message: str) -> None:
+    assert rounded(value) == message

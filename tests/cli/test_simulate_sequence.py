@@ -61,7 +61,10 @@ def test_the_table_is_printed_written_and_the_same_again(shell: Any, shocks: Pat
         (("--sequence",), "--kind toppling: a block that topples or rocks carries no state"),
         (("--kind", "sliding", "--seed", "2"), "--seed requires --sequence"),
         (("--kind", "sliding", "--out", "a.csv"), "--out requires --sequence"),
-        (("--sequence", "--vertical", "with"), "--vertical cannot be combined with --sequence"),
+        (
+            ("--kind", "sliding", "--sequence", "--vertical", "with"),
+            "--vertical cannot be combined with --sequence",
+        ),
     ],
 )
 def test_options_that_do_not_go_together_are_rejected(

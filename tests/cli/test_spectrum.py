@@ -36,7 +36,7 @@ def test_one_motion_is_one_object(shell: Shell, record: Path) -> None:
 
 def test_several_are_a_list_in_the_order_given(shell: Shell, record: Path, other: Path) -> None:
     answers = shell.json("spectrum", other, record, "--polarity", "both")
-    assert [(one["motion"], one["polarity"]) for one in answers] == [
+    assert [(answer["motion"], answer["polarity"]) for answer in answers] == [
         (str(other), "forward"),
         (str(other), "reverse"),
         (str(record), "forward"),

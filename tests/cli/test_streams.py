@@ -1,4 +1,4 @@
-"""What is printed comes out on any terminal, and a full disk ends with a sentence."""
+"""Output appears on any terminal, and a full disk ends with a sentence."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ COMMAND = (sys.executable, "-m", "rbfrag.cli.main", "predict", "--p2", "3", "--k
     ],
 )
 def test_a_character_that_a_stream_cannot_write_is_replaced(encoding: str, written: str) -> None:
-    done = subprocess.run(
+    process = subprocess.run(
         [*COMMAND, "0.6"], capture_output=True, check=True, env={"PYTHONIOENCODING": encoding}
     )
-    assert written in done.stdout.decode(encoding)
-    assert done.stderr == b""
+    assert written in process.stdout.decode(encoding)
+    assert process.stderr == b""
     rejected = subprocess.run(
         [*COMMAND, "0.6", "--p2", "-1"], capture_output=True, check=False,
         env={"PYTHONIOENCODING": encoding},
@@ -37,8 +37,8 @@ def test_a_character_that_a_stream_cannot_write_is_replaced(encoding: str, writt
 @pytest.mark.parametrize("more", [(), ("--json",)])
 def test_a_full_disk_ends_with_a_sentence(more: tuple[str, ...]) -> None:
     with Path("/dev/full").open("w") as full:
-        done = subprocess.run(
+        process = subprocess.run(
             [*COMMAND, "0.6", *more], stdout=full, stderr=subprocess.PIPE, text=True, check=False
         )
-    assert done.returncode == 1
-    assert done.stderr == "rbfrag: the answer cannot be written: No space left on device\n"
+    assert process.returncode == 1
+    assert process.stderr == "rbfrag: the answer cannot be written: No space left on device\n"

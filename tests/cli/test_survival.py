@@ -37,16 +37,16 @@ def curve(shell: Shell) -> str:
 
 
 def test_one_block(shell: Shell, curve: str) -> None:
-    found = shell.json("survival", curve, *BLOCK, "--age", "200")
+    answer = shell.json("survival", curve, *BLOCK, "--age", "200")
     rate = shell.json("hazard", curve, *BLOCK)["annual_rate"]
-    assert found["annual_rate_any"] == pytest.approx(rate, rel=1e-4)
-    assert found["probability_standing"] == pytest.approx(math.exp(-200 * rate), rel=1e-4)
-    assert found["factor_5_percent"] == pytest.approx(math.log(20) / (200 * rate), rel=1e-4)
-    assert found["factor_50_percent"] == pytest.approx(math.log(2) / (200 * rate), rel=1e-4)
-    (branch,) = found["branches"]
+    assert answer["annual_rate_any"] == pytest.approx(rate, rel=1e-4)
+    assert answer["probability_standing"] == pytest.approx(math.exp(-200 * rate), rel=1e-4)
+    assert answer["factor_5_percent"] == pytest.approx(math.log(20) / (200 * rate), rel=1e-4)
+    assert answer["factor_50_percent"] == pytest.approx(math.log(2) / (200 * rate), rel=1e-4)
+    (branch,) = answer["branches"]
     assert (branch["weight"], branch["weight_given_standing"]) == (None, None)
-    assert (found["bounds"], found["imt"], found["kind"]) == (None, "PGV", "toppling")
-    assert any("backed by a rock face" in text for text in found["warnings"])
+    assert (answer["bounds"], answer["imt"], answer["kind"]) == (None, "PGV", "toppling")
+    assert any("backed by a rock face" in text for text in answer["warnings"])
 
 
 def test_a_sentence_goes_before_the_numbers(shell: Shell, curve: str) -> None:
@@ -66,49 +66,49 @@ def test_a_sentence_goes_before_the_numbers(shell: Shell, curve: str) -> None:
 
 def test_a_table_has_its_own_sigmas(shell: Shell, curve: str) -> None:
     Path("one.csv").write_text("block_id,p2_1_s2,kr,kr_sigma,p2_sigma\nA7,3,0.1,0.2,\n")
-    asked = ("--component", "single", "--kind", "toppling", "--age", "200")
-    table = shell.json("survival", curve, "--blocks", "one.csv", "--kr-sigma", "0.7", *asked)
+    command = ("--component", "single", "--kind", "toppling", "--age", "200")
+    table = shell.json("survival", curve, "--blocks", "one.csv", "--kr-sigma", "0.7", *command)
     alone = shell.json("survival", curve, *BLOCK, "--kr-sigma", "0.2", "--age", "200")
     assert table["probability_standing"] == alone["probability_standing"]
     Path("two.csv").write_text("p2_1_s2,kr\n3,0.1\n3,0.1\n")
-    both = shell.json("survival", curve, "--blocks", "two.csv", *asked)
+    both = shell.json("survival", curve, "--blocks", "two.csv", *command)
     assert both["blocks"] == 2
     assert set(both["bounds"]) == {"independent", "fully_dependent"}
-    printed = shell("survival", curve, "--blocks", "two.csv", *asked)
+    printed = shell("survival", curve, "--blocks", "two.csv", *command)
     assert "P(all 2 blocks still standing after 200 years)" in printed.stdout
     assert "fully dependent  " in printed.stdout
 
 
 def test_weights_in_the_order_of_the_curves(shell: Shell, curve: str) -> None:
     other = written("other.csv", 3.0)
-    asked = (curve, other, *BLOCK, "--age", "300")
-    found = shell.json("survival", *asked, "--weights", "0.4,0.6")
-    first, second = found["branches"]
-    whole = 0.4 * first["probability_standing"] + 0.6 * second["probability_standing"]
-    assert found["probability_standing"] == pytest.approx(whole, rel=1e-9)
+    command = (curve, other, *BLOCK, "--age", "300")
+    answer = shell.json("survival", *command, "--weights", "0.4,0.6")
+    first, second = answer["branches"]
+    complete = 0.4 * first["probability_standing"] + 0.6 * second["probability_standing"]
+    assert answer["probability_standing"] == pytest.approx(complete, rel=1e-9)
     assert first["weight_given_standing"] == pytest.approx(
-        0.4 * first["probability_standing"] / whole, rel=1e-9
+        0.4 * first["probability_standing"] / complete, rel=1e-9
     )
-    assert shell.json("survival", *asked)["probability_standing"] == first["probability_standing"]
-    assert "The hazard of" in shell("survival", *asked, "--weights", "0.4,0.6").stdout
+    assert shell.json("survival", *command)["probability_standing"] == first["probability_standing"]
+    assert "The hazard of" in shell("survival", *command, "--weights", "0.4,0.6").stdout
 
 
 def test_branches_of_openquake(shell: Shell, curve: str, formats_dir: Path) -> None:
     tree = formats_dir / TREE
     files = [tree / f"hazard_curve-{name}-PGV_7.csv" for name in ("mean", "rlz-000", "rlz-001")]
     files += [tree / "hazard_curve-rlz-002-PGV_7.csv", tree / "quantile_curve-0.84-PGV_7.csv"]
-    asked = ("--site", "SLIDE-A", *BLOCK, "--age", "3000")
+    command = ("--site", "SLIDE-A", *BLOCK, "--age", "3000")
     weights = ("--weights", tree / "realizations_7.csv")
-    found = shell.json("survival", *files, *asked, *weights, "--plot", "tree.svg")
-    assert [one["name"] for one in found["branches"]] == [
+    answer = shell.json("survival", *files, *command, *weights, "--plot", "tree.svg")
+    assert [branch["name"] for branch in answer["branches"]] == [
         "mean", "rlz-000", "rlz-001", "rlz-002", "quantile-0.84"
     ]  # fmt: skip
-    before = [one["weight"] for one in found["branches"]]
+    before = [branch["weight"] for branch in answer["branches"]]
     assert before[1:4] == pytest.approx([0.5, 0.3, 0.2], abs=1e-6)
-    assert (before[0], before[4], found["site"]) == (None, None, "SLIDE-A")
-    after = [one["weight_given_standing"] for one in found["branches"][1:4]]
+    assert (before[0], before[4], answer["site"]) == (None, None, "SLIDE-A")
+    after = [branch["weight_given_standing"] for branch in answer["branches"][1:4]]
     assert sum(after) == pytest.approx(1.0, rel=1e-12)
-    rates = [one["annual_rate_any"] for one in found["branches"][1:4]]
+    rates = [branch["annual_rate_any"] for branch in answer["branches"][1:4]]
     calmest = int(np.argmin(rates))
     assert after[calmest] > before[1 + calmest]
     drawn = Path("tree.svg").read_text()
@@ -121,19 +121,21 @@ def test_rejections_of_a_logic_tree(
 ) -> None:
     tree = formats_dir / TREE
     branch, weights = tree / "hazard_curve-rlz-000-PGV_7.csv", tree / "realizations_7.csv"
-    asked = (*BLOCK, "--age", "3000")
+    command = (*BLOCK, "--age", "3000")
     at = ("--site", "SLIDE-A")
-    assert "choose it by number or name" in rejects("survival", branch, *asked)
-    assert "add up to 0.5, not 1" in rejects("survival", branch, *at, *asked, "--weights", weights)
-    assert "none of the curves is one" in rejects("survival", curve, *asked, "--weights", weights)
+    assert "choose it by number or name" in rejects("survival", branch, *command)
+    assert "add up to 0.5, not 1" in rejects(
+        "survival", branch, *at, *command, "--weights", weights
+    )
+    assert "none of the curves is one" in rejects("survival", curve, *command, "--weights", weights)
     Path("few.csv").write_text("rlz_id,branch_path,weight\n1,A~B,1.0\n")
-    message = rejects("survival", branch, *at, *asked, "--weights", "few.csv")
+    message = rejects("survival", branch, *at, *command, "--weights", "few.csv")
     assert "there is no rlz_id 0" in message
     Path("none.csv").write_text("rlz_id,weight\n0,half\n")
-    message = rejects("survival", branch, *at, *asked, "--weights", "none.csv")
+    message = rejects("survival", branch, *at, *command, "--weights", "none.csv")
     assert "is not a realization" in message
     other = tree / "hazard_curve-mean-PGA_7.csv"
-    assert "curves are of PGV, PGA" in rejects("survival", branch, other, *at, *asked)
+    assert "curves are of PGV, PGA" in rejects("survival", branch, other, *at, *command)
 
 
 @pytest.mark.parametrize(

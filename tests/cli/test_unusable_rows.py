@@ -33,7 +33,7 @@ BAD = {
     "kind": "B,3,0.1,topple,sliding,1,100,0012,20.0,40.5,0.6\n",
     "short": "B,3,0.1\n",
 }
-SAID = "1 of 3 blocks could not be used"
+MESSAGE = "1 of 3 blocks could not be used"
 SINGLE = ("--component", "single")
 
 
@@ -78,23 +78,23 @@ def test_a_bad_row_comes_back_with_its_reason(
     shell: Shell, command: tuple[str, ...], value: str, kind: str
 ) -> None:
     Path("b.csv").write_text(HEAD + SOUND["A"] + BAD[kind] + SOUND["C"])
-    found = shell.json(*command, "b.csv", "--out", "out.csv")
-    (said,) = (text for text in found["warnings"] if "could not be used" in text)
-    assert said.startswith(SAID)
-    assert "the reasons stand in the column reason; it is line 3" in said
+    answer = shell.json(*command, "b.csv", "--out", "out.csv")
+    (message,) = (text for text in answer["warnings"] if "could not be used" in text)
+    assert message.startswith(MESSAGE)
+    assert "the reasons stand in the column reason; it is line 3" in message
     first, bad, last = rows_of("out.csv")
     assert [row["block_id"] for row in (first, bad, last)] == ["A", "B", "C"]
     assert (bad[value], first["reason"], last["reason"]) == ("", "", "")
-    assert bad["reason"] in said
+    assert bad["reason"] in message
     assert len(bad["reason"]) > 10
     expected = shell.json(*command, "sound.csv", "--out", "sound-out.csv")
     for row, same in zip((first, last), rows_of("sound-out.csv"), strict=True):
         assert row == same
     if command[0] == "predict":
-        assert (found["rows"], found["answered"], found["without_answer"]) == (3, 2, 1)
+        assert (answer["rows"], answer["answered"], answer["without_answer"]) == (3, 2, 1)
         return
-    assert "lower bounds" in said
-    assert without_texts(found) == without_texts(expected)
+    assert "lower bounds" in message
+    assert without_texts(answer) == without_texts(expected)
     assert "Traceback" not in shell(*command, "b.csv", "--out", "out.csv").stderr
 
 
@@ -106,23 +106,23 @@ def test_losses_leave_a_bad_row_out(shell: Shell, kind: str) -> None:
         "weight": "B,3,0.1,,,some,100,0012,20.0,40.5,0.6\n",
     }  # fmt: skip
     Path("b.csv").write_text(HEAD + SOUND["A"] + {**BAD, **other}[kind] + SOUND["C"])
-    asked = ("losses", "job", *SINGLE, "--samples", "20", "--blocks")
-    found, expected = shell.json(*asked, "b.csv"), shell.json(*asked, "sound.csv")
-    assert without_texts(found) == without_texts(expected)
-    first, bad, last = found["blocks"]
+    command = ("losses", "job", *SINGLE, "--samples", "20", "--blocks")
+    answer, expected = shell.json(*command, "b.csv"), shell.json(*command, "sound.csv")
+    assert without_texts(answer) == without_texts(expected)
+    first, bad, last = answer["blocks"]
     assert [row["block_id"] for row in (first, bad, last)] == ["A", "B", "C"]
     assert bad["average_annual_failures"] is bad["average_annual_loss"] is None
     assert (first["reason"], last["reason"]) == ("", "")
-    said = [text for text in found["warnings"] if text not in expected["warnings"]]
-    assert len(said) == 1
-    assert said[0].startswith(f"{SAID} and are left out of all sums, which are lower bounds")
-    assert bad["reason"] in said[0]
-    assert any("1 of 2 blocks state no loss" in text for text in found["warnings"])
+    message = [text for text in answer["warnings"] if text not in expected["warnings"]]
+    assert len(message) == 1
+    assert message[0].startswith(f"{MESSAGE} and are left out of all sums, which are lower bounds")
+    assert bad["reason"] in message[0]
+    assert any("1 of 2 blocks have no loss and count as 0" in text for text in answer["warnings"])
     assert (first["average_annual_loss"] > 0.0, last["average_annual_loss"]) == (True, None)
-    assert rbfrag.losses("job", "b.csv", component="single", samples=20).as_dict() == found
-    printed = shell(*asked, "b.csv")
+    assert rbfrag.losses("job", "b.csv", component="single", samples=20).as_dict() == answer
+    printed = shell(*command, "b.csv")
     assert "reason" in printed.stdout
-    assert "reason" not in shell(*asked, "sound.csv").stdout
+    assert "reason" not in shell(*command, "sound.csv").stdout
 
 
 @pytest.mark.usefixtures("tables")
@@ -131,7 +131,7 @@ def test_answers_that_need_every_row_name_all_that_are_bad(
     shell: Shell, rejects: Rejects, command: str
 ) -> None:
     Path("b.csv").write_text(HEAD + SOUND["A"] + "".join(BAD.values()) + SOUND["C"])
-    asked: dict[str, tuple[str, ...]] = {
+    inputs: dict[str, tuple[str, ...]] = {
         "survival": (
             "survival",
             "curve.csv",
@@ -144,25 +144,25 @@ def test_answers_that_need_every_row_name_all_that_are_bad(
         ),
         "export": ("export", "nrml", *UNUSED, "--out", "a.xml"),
     }
-    message = rejects(*asked[command], "--blocks", "b.csv")
+    message = rejects(*inputs[command], "--blocks", "b.csv")
     assert "7 of 9 blocks are invalid" in message
     assert "line 3 (block B)" in message
     assert "correct or remove these rows" in message
     assert len(message) < 500
     assert not Path("a.xml").exists()
-    shell(*asked[command], "--blocks", "sound.csv")
+    shell(*inputs[command], "--blocks", "sound.csv")
 
 
 @pytest.mark.usefixtures("tables")
 def test_only_a_table_without_a_block_is_rejected(shell: Shell, rejects: Rejects) -> None:
     Path("b.csv").write_text(HEAD + "".join(BAD.values()))
-    for asked in (
+    for inputs in (
         ("predict", "--batch", "b.csv", "--out", "o.csv", *UNUSED),
         ("hazard", "curve.csv", "--blocks", "b.csv", "--out", "o.csv", *UNUSED),
         ("shakemap", "grid.xml", "--blocks", "b.csv", "--out", "o.csv"),
         ("losses", "job", "--blocks", "b.csv"),
     ):
-        message = rejects(*asked)
+        message = rejects(*inputs)
         assert "b.csv: none of 7 blocks is valid, the first 6: line 2" in message
         assert not Path("o.csv").exists()
 
@@ -170,11 +170,11 @@ def test_only_a_table_without_a_block_is_rejected(shell: Shell, rejects: Rejects
 @pytest.mark.usefixtures("tables")
 def test_one_block_of_a_table_keeps_its_name(shell: Shell) -> None:
     Path("b.csv").write_text(HEAD + BAD["empty"] + SOUND["C"])
-    found = shell.json("hazard", "curve.csv", "--blocks", "b.csv", *UNUSED)
-    bad, sound = found["blocks"]
+    answer = shell.json("hazard", "curve.csv", "--blocks", "b.csv", *UNUSED)
+    bad, sound = answer["blocks"]
     assert (bad["block_id"], bad["annual_rate"]) == ("B", None)
     assert (sound["block_id"], sound["reason"]) == ("C", "")
-    assert found["expected_failures_per_year"] == sound["annual_rate"] == found["annual_rate_any"]
+    assert answer["expected_failures_per_year"] == sound["annual_rate"] == answer["annual_rate_any"]
     assert "reason" in shell("hazard", "curve.csv", "--blocks", "b.csv", *UNUSED).stdout
 
 
@@ -182,24 +182,24 @@ def test_one_block_of_a_table_keeps_its_name(shell: Shell) -> None:
 def test_points_that_cannot_be_used_stay_on_the_map(shell: Shell) -> None:
     rows = [SOUND["A"], BAD["text"], "D,3,0.1,,,,,,,,\n", "E,3,0.1,,,,,,30.0,40.5,\n"]
     Path("b.csv").write_text(HEAD + "".join(rows))
-    asked = ("shakemap", "grid.xml", *SINGLE, "--blocks", "b.csv", "--plot", "a.svg", "--out")
-    found = shell.json(*asked, "a.geojson")
+    command = ("shakemap", "grid.xml", *SINGLE, "--blocks", "b.csv", "--plot", "a.svg", "--out")
+    answer = shell.json(*command, "a.geojson")
     features = json.loads(Path("a.geojson").read_text())["features"]
-    assert [each["properties"]["block_id"] for each in features] == ["A", "B", "D", "E"]
-    places = [each["geometry"] and each["geometry"]["coordinates"] for each in features]
-    assert places == [[20.0, 40.5], [20.0, 40.5], None, [30.0, 40.5]]
-    known = [each["properties"]["probability"] is not None for each in features]
-    assert known == [True, False, False, False]
+    assert [feature["properties"]["block_id"] for feature in features] == ["A", "B", "D", "E"]
+    positions = [feature["geometry"] and feature["geometry"]["coordinates"] for feature in features]
+    assert positions == [[20.0, 40.5], [20.0, 40.5], None, [30.0, 40.5]]
+    expected = [feature["properties"]["probability"] is not None for feature in features]
+    assert expected == [True, False, False, False]
     assert features[3]["properties"]["reason"] == "the block lies off the map"
-    assert found["places"] == 1
-    assert found["expected_failures"] == features[0]["properties"]["probability"]
+    assert answer["places"] == 1
+    assert answer["expected_failures"] == features[0]["properties"]["probability"]
     same = rbfrag.shakemap("grid.xml", blocks="b.csv", component="single")
-    assert {name: found[name] for name in same.as_dict()} == same.as_dict()
+    assert {name: answer[name] for name in same.as_dict()} == same.as_dict()
     assert same.to_frame()["reason"].tolist() == [e["properties"]["reason"] for e in features]
     raw = pytest.importorskip("pyogrio.raw")
-    shell(*asked, "a.gpkg")
+    shell(*command, "a.gpkg")
     meta, _, geometry, columns = raw.read("a.gpkg", layer="toppling_probability")
-    assert [each is None for each in geometry] == [False, False, True, False]
+    assert [feature is None for feature in geometry] == [False, False, True, False]
     assert np.isnan(columns[list(meta["fields"]).index("probability")]).tolist() == [
         False, True, True, True,
     ]  # fmt: skip
@@ -209,30 +209,34 @@ def test_points_that_cannot_be_used_stay_on_the_map(shell: Shell) -> None:
 def test_the_mean_of_a_table_says_which_rows_it_is_without(shell: Shell) -> None:
     Path("b.csv").write_text("p2_1_s2,kr\n3,0.1\n3,x\n10,0.3\n3,\n")
     Path("s.csv").write_text("p2_1_s2,kr\n3,0.1\n10,0.3\n")
-    found, expected = (
+    result, expected = (
         shell.json("shakemap", "grid.xml", *SINGLE, "--blocks", name, "--out", "a.csv")
         for name in ("b.csv", "s.csv")
     )
-    (said,) = (text for text in found["warnings"] if text not in expected["warnings"])
-    assert said.startswith("2 of 4 blocks could not be used and are left out of the mean: line 3:")
-    assert "; line 5: kr is not a number" in said
-    assert found["expected_failures"] == expected["expected_failures"]
+    (message,) = (text for text in result["warnings"] if text not in expected["warnings"])
+    assert message.startswith(
+        "2 of 4 blocks could not be used and are left out of the mean: line 3:"
+    )
+    assert "; line 5: kr is not a number" in message
+    assert result["expected_failures"] == expected["expected_failures"]
 
 
 @pytest.mark.usefixtures("tables")
 def test_arrays_in_python_are_answered_as_tables() -> None:
     p2, kr = [3.0, 3.0, np.nan, 10.0], [0.1, -0.1, 0.1, 0.3]
-    found = rbfrag.hazard("curve.csv", p2, kr, component="single")
+    answer = rbfrag.hazard("curve.csv", p2, kr, component="single")
     sound = rbfrag.hazard("curve.csv", [3.0, 10.0], [0.1, 0.3], component="single")
-    assert np.isnan(found.annual_rate).tolist() == [False, True, True, False]
-    assert found.annual_rate[[0, 3]].tolist() == sound.annual_rate.tolist()
-    assert found.annual_rate_any == sound.annual_rate_any
-    assert found.expected_failures_per_year == sound.expected_failures_per_year
-    assert [bool(text) for text in found.reason] == [False, True, True, False]
-    assert found.to_frame()["reason"].tolist() == found.reason.tolist()
-    (said,) = (text for text in found.warnings if text not in sound.warnings and "could" in text)
-    assert said.startswith("2 of 4 blocks could not be used and are left out of all sums")
-    assert "element 1: kr = -0.1 is not above zero" in said
+    assert np.isnan(answer.annual_rate).tolist() == [False, True, True, False]
+    assert answer.annual_rate[[0, 3]].tolist() == sound.annual_rate.tolist()
+    assert answer.annual_rate_any == sound.annual_rate_any
+    assert answer.expected_failures_per_year == sound.expected_failures_per_year
+    assert [bool(text) for text in answer.reason] == [False, True, True, False]
+    assert answer.to_frame()["reason"].tolist() == answer.reason.tolist()
+    (message,) = (
+        text for text in answer.warnings if text not in sound.warnings and "could" in text
+    )
+    assert message.startswith("2 of 4 blocks could not be used and are left out of all sums")
+    assert "element 1: kr = -0.1 is not above zero" in message
     with pytest.raises(rbfrag.InputError, match=r"^kr = -0\.1 is not above zero"):
         rbfrag.hazard("curve.csv", 3.0, -0.1)
     with pytest.raises(rbfrag.InputError, match="none of 2 blocks is valid: element 0: p2 = 0"):
@@ -255,10 +259,10 @@ def test_blocks_of_sites_without_a_curve_have_their_reason(
     )
     head = "block_id,p2_1_s2,kr,site_id\n"
     Path("b.csv").write_text(head + "A,3,0.1,SLIDE-A\nB,10,0.2,12\nC,3,0.2,0012\nD,3,,0012\n")
-    found = shell.json("hazard", curve, "--blocks", "b.csv", *SINGLE, "--out", "o.csv")
-    assert [row["block_id"] for row in found["blocks"]] == ["A", "B", "C", "D"]
-    assert "stands at site '12', of which there is no curve" in found["blocks"][1]["reason"]
-    assert any(text.startswith("2 of 4 blocks could not be used") for text in found["warnings"])
+    answer = shell.json("hazard", curve, "--blocks", "b.csv", *SINGLE, "--out", "o.csv")
+    assert [row["block_id"] for row in answer["blocks"]] == ["A", "B", "C", "D"]
+    assert "stands at site '12', of which there is no curve" in answer["blocks"][1]["reason"]
+    assert any(text.startswith("2 of 4 blocks could not be used") for text in answer["warnings"])
     assert [row["site"] for row in rows_of("o.csv")] == ["SLIDE-A", "12", "0012", "0012"]
     only = shell.json("hazard", curve, "--blocks", "b.csv", *SINGLE, "--site", "0012")
     assert [row["block_id"] for row in only["blocks"]] == ["C", "D"]
@@ -268,5 +272,5 @@ def test_blocks_of_sites_without_a_curve_have_their_reason(
 
 def test_a_chart_shows_the_blocks_that_it_can(shell: Shell) -> None:
     Path("b.csv").write_text("alpha1_deg,alpha3_deg\n-20,20\nsteep,20\n,20\n-30,10\n")
-    done = shell("plot", "modes", "--phi", "30", "--blocks", "b.csv", "--out", "a.svg")
-    assert "2 of 4 rows have invalid angles and are not shown" in done.stdout
+    process = shell("plot", "modes", "--phi", "30", "--blocks", "b.csv", "--out", "a.svg")
+    assert "2 of 4 rows have invalid angles and are not shown" in process.stdout

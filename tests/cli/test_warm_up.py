@@ -21,18 +21,18 @@ def test_every_kernel_is_there_afterwards_and_is_not_compiled_again(shell: Shell
     assert "campaigns of kind rocking" in first.stderr
     # machine code on disk, of this state of the sources; inner kernels are compiled by others
     missing = [
-        f"{name}.{each}"
+        f"{name}.{item}"
         for package in (rbfrag.hazards, rbfrag.solver)
         for _, name, _ in pkgutil.walk_packages(package.__path__, f"{package.__name__}.")
-        for each, kernel in vars(import_module(name)).items()
+        for item, kernel in vars(import_module(name)).items()
         if isinstance(kernel, CPUDispatcher) and kernel.py_func.__module__ == name
         if hasattr(kernel._cache, "_cache_file") and not kernel._cache._cache_file._load_index()
     ]
     assert missing == []
     # in another process nothing is left to compile
-    said = subprocess.run(
+    message = subprocess.run(
         [*COMMAND, "warm-up"], env=environment(), capture_output=True, text=True, check=True,
         timeout=900,
     ).stderr  # fmt: skip
-    assert "compiling" not in said
-    assert "responses and searches" in said
+    assert "compiling" not in message
+    assert "responses and searches" in message

@@ -44,9 +44,9 @@ def engine(place: str, empty_database: bytes) -> Iterator[Engine]:
     """An empty database."""
     if "://" not in place:
         Path(place).write_bytes(empty_database)
-    made = open_database(place, create=True)
-    yield made
-    made.dispose()
+    engine = open_database(place, create=True)
+    yield engine
+    engine.dispose()
 
 
 @pytest.fixture
@@ -63,8 +63,13 @@ def make_motion() -> Callable[..., GroundMotion]:
 
     def make(seed: int = 0, **labels: Any) -> GroundMotion:
         samples = np.random.default_rng(seed).normal(scale=0.2, size=64)
-        given = {"station": "HVSC", "component": "000", "source_file": f"{seed}.txt", **labels}
-        return GroundMotion(samples, 0.01, **given)
+        labels_of_motion = {
+            "station": "HVSC",
+            "component": "000",
+            "source_file": f"{seed}.txt",
+            **labels,
+        }
+        return GroundMotion(samples, 0.01, **labels_of_motion)
 
     return make
 
@@ -74,12 +79,12 @@ def make_result() -> Callable[..., CriticalResult]:
     """A consistent answer of the solver for a motion of the given PGA."""
 
     def make(pga_g: float = 0.5, *, p2: float = 3.0, k: float = 0.4, **changes: Any) -> Any:
-        found = changes.get("status", "found") == "found"
+        is_found = changes.get("status", "found") == "found"
         kr = k * pga_g
         points = SearchPoints(
             kr_over_pga=np.array([0.9, k + 0.01, k, k]),
             theta_n=np.array([0.1, 0.7, np.nan, np.nan]),
-            outcome=("stable", "stable", *["toppled" if found else "undetermined"] * 2),
+            outcome=("stable", "stable", *["toppled" if is_found else "undetermined"] * 2),
         )
         values: dict[str, Any] = {
             "kind": "toppling",
@@ -88,16 +93,16 @@ def make_result() -> Callable[..., CriticalResult]:
             "pga_g": pga_g,
             "status": "found",
             "search_limit": 0.01,
-            "kr_over_pga": k if found else None,
-            "lower": k if found else None,
-            "upper": k + 1e-12 if found else None,
-            "kr": kr if found else None,
-            "y_m_s": kr * 9.80665 / abs(p2) ** 0.5 if found else None,
+            "kr_over_pga": k if is_found else None,
+            "lower": k if is_found else None,
+            "upper": k + 1e-12 if is_found else None,
+            "kr": kr if is_found else None,
+            "y_m_s": kr * 9.80665 / abs(p2) ** 0.5 if is_found else None,
             "certified": True,
             "k_up_over_pga": 1.0,
             "undecided": 0.0,
             "island_width": 0.1,
-            "kr_over_pga_resolved": k if found else None,
+            "kr_over_pga_resolved": k if is_found else None,
             "reentrant": False,
             "n_runs": 40,
             "warnings": ("a warning",),

@@ -12,20 +12,17 @@ from sqlalchemy import Engine, Text, and_, delete, func, select, update
 from sqlalchemy.exc import IntegrityError
 
 from rbfrag.db import schema
-from rbfrag.db.check.damage import Damage
-from rbfrag.db.check.database import (
-    ALTERED,
-    NOT_COVERED,
-    check_database,
-    check_digests,
-)
+from rbfrag.db.campaigns import store_spectrum
+from rbfrag.db.check import ALTERED, check_database, check_digests
+from rbfrag.db.check_results import Damage
 from rbfrag.db.engine import opened_database
-from rbfrag.db.insert import insert_row, insert_rows
+from rbfrag.db.insert import insert_if_new, insert_row, insert_rows
 from rbfrag.db.keys import pair_key, response_key
 from rbfrag.db.model_file import ModelRow
 from rbfrag.db.models import save_model
+from rbfrag.db.motion_spectra import HorizontalPair, pair_rows
+from rbfrag.db.motions import load_motion
 from rbfrag.db.shock_pairs import PARTS, ShockEnd
-from rbfrag.db.spectra import store_spectrum
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.polarity import POLARITIES
 from rbfrag.motions.toppling_spectrum import toppling_spectrum as spectrum_of
@@ -44,8 +41,8 @@ MAP = (
 
 
 def _checked(connection: Any) -> list[Damage]:
-    """What is found apart from the digests, which differ wherever a test alters a value."""
-    return [found for found in check_database(connection) if found.problem != ALTERED]
+    """Return the findings without the digests, which differ wherever a test alters a value."""
+    return [finding for finding in check_database(connection) if finding.problem != ALTERED]
 
 
 class TestCheck:
@@ -134,7 +131,10 @@ def _store_map(connection: Any, intervals: Any, *, status: str = "found") -> Non
     row_id = connection.scalar(first)
     columns = ("combination_id", "k_lo", "k_hi", "outcome")
     insert_rows(
-        connection, schema.outcome_interval, columns, [(row_id, *each) for each in intervals]
+        connection,
+        schema.outcome_interval,
+        columns,
+        [(row_id, *interval) for interval in intervals],
     )
 
 
@@ -188,18 +188,26 @@ def _store_spectrum(connection: Any, motion: GroundMotion) -> None:
         store_spectrum(connection, motion_id, polarity=polarity, p2=[3.0, 0.1], x_m_s=values)
 
 
+def _store_peaks(connection: Any) -> None:
+    ids = connection.scalars(select(schema.motion.c.id).order_by(schema.motion.c.id).limit(2)).all()
+    motions = [load_motion(connection, number) for number in ids]
+    for values in pair_rows(HorizontalPair(*ids), *motions):
+        insert_if_new(connection, schema.recording_spectrum, values)
+
+
 @pytest.mark.parametrize("table", sorted(schema.metadata.tables))
 def test_an_altered_value_is_found(
     filled: Engine, make_motion: Any, model: ModelRow, table: str
 ) -> None:
     # by the digest of its row, whatever else there is to compare a value with
     altered = schema.metadata.tables[table]
-    columns = [column for column in altered.c if column.name not in NOT_COVERED]
+    columns = [column for column in altered.c if column.name != "id"]
     with filled.begin() as connection:
         _store_map(connection, MAP)
         _store_response(connection)
         _store_pair(connection)
         _store_spectrum(connection, make_motion(1))
+        _store_peaks(connection)
         save_model(connection, model)
         assert check_database(connection) == []
         row = connection.execute(select(altered).limit(1)).mappings().one()
@@ -212,8 +220,8 @@ def test_an_altered_value_is_found(
             except IntegrityError:
                 pass  # the schema rejects it
             else:
-                found = list(check_digests(connection))
-                assert [each.table for each in found] == [table], column.name
+                findings = list(check_digests(connection))
+                assert [finding.table for finding in findings] == [table], column.name
             point.rollback()
 
 
@@ -289,7 +297,7 @@ def test_measures_are_calculated_anew(filled: Engine, values: Any, problem: str)
     with filled.begin() as connection:
         first = connection.scalar(select(func.min(motion.c.id)))
         connection.execute(update(motion).where(motion.c.id == first).values(**values))
-        findings = [found for found in _checked(connection) if found.table == "motion"]
+        findings = [finding for finding in _checked(connection) if finding.table == "motion"]
     assert [finding.row for finding in findings] == [str(first)]
     assert problem in findings[0].problem
     assert "1.txt" in findings[0].advice  # the file to add again
@@ -355,9 +363,9 @@ def test_numerics_of_the_campaign_agree(filled: Engine) -> None:
 
 
 def test_rows_are_looked_at_in_any_number(filled: Engine, monkeypatch: Any) -> None:
-    import rbfrag.db.check.combinations
+    import rbfrag.db.check_results
 
-    monkeypatch.setattr(rbfrag.db.check.combinations, "_ROWS_AT_ONCE", 2)
+    monkeypatch.setattr(rbfrag.db.check_results, "_ROWS_AT_ONCE", 2)
     with filled.begin() as connection:
         connection.execute(update(schema.combination).values(settings="{"))
         connection.execute(delete(schema.simulation))

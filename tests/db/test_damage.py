@@ -14,14 +14,14 @@ from typer.testing import CliRunner
 
 import rbfrag
 from rbfrag.cli.main import app
-from rbfrag.db.check.database import check_database, coverage
+from rbfrag.db.campaigns import keys_with_samples, stored_combination
+from rbfrag.db.check import check_database, coverage
 from rbfrag.db.engine import opened_database
 from rbfrag.db.location import reference_file
 from rbfrag.db.model_file import STORED, ModelRow, read_models
 from rbfrag.db.models import model_rows, save_model, set_default
 from rbfrag.db.motions import motion_rows
 from rbfrag.db.queries import combination_table
-from rbfrag.db.stored_combination import keys_with_samples, stored_combination
 from rbfrag.errors import DatabaseError, RbfragError
 
 
@@ -31,8 +31,8 @@ def test_a_truth_value_is_zero_or_one(sqlite_file: Path, fill: Any, value: str) 
         fill(connection, [1])
     _raw(sqlite_file, f"UPDATE motion SET is_vertical = {value} WHERE id = 1")
     with opened_database(sqlite_file, read_only=True) as engine, engine.connect() as connection:
-        found = check_database(connection)
-    assert any("is_vertical" in each.problem for each in found)
+        findings = check_database(connection)
+    assert any("is_vertical" in finding.problem for finding in findings)
 
 
 def test_a_change_of_a_row_does_not_hide_that_it_was_altered(
@@ -46,7 +46,7 @@ def test_a_change_of_a_row_does_not_hide_that_it_was_altered(
         with engine.begin() as connection, pytest.raises(DatabaseError, match="is damaged"):
             set_default(connection, "second")
         with engine.connect() as connection:
-            assert {found.row for found in check_database(connection)} >= {"first"}
+            assert {finding.row for finding in check_database(connection)} >= {"first"}
         # what the check advises goes on working
         with engine.begin() as connection:
             save_model(connection, replace(model, name="first"), replace=True)
@@ -72,16 +72,16 @@ def test_the_command_ends_with_findings(
     table, _, name = column.partition(".")
     _raw(sqlite_file, f"UPDATE {table} SET {name} = {value} WHERE rowid = 1"
          if table != "simulation" else f"UPDATE {table} SET {name} = {value}")  # fmt: skip
-    done = CliRunner().invoke(app, ["db", "check", "--db", str(sqlite_file), "--sample", "9"])
-    assert isinstance(done.exception, SystemExit), done.exception
-    assert done.exit_code == 1
-    assert table in done.output
+    result = CliRunner().invoke(app, ["db", "check", "--db", str(sqlite_file), "--sample", "9"])
+    assert isinstance(result.exception, SystemExit), result.exception
+    assert result.exit_code == 1
+    assert table in result.output
 
 
 def test_what_is_not_covered_is_said(filled: Engine) -> None:
     with filled.connect() as connection:
         text = coverage(connection)
-    assert "of 13 tables, each column but id by the digest of its row" in text
+    assert "of 15 tables, each column but id by the digest of its row" in text
     assert "measures of 3 motions" in text
     assert "rows deleted, added, or altered with their digest by another program" in text
 
@@ -134,13 +134,13 @@ def test_no_value_ends_in_a_traceback(
     with opened_database(sqlite_file) as engine, engine.begin() as connection:
         fill(connection, [1, 2])
         save_model(connection, model)
-    one = "" if table == "simulation" else "WHERE id = 1"
-    _raw(sqlite_file, f"UPDATE {table} SET {name} = {value} {one}")
+    condition = "" if table == "simulation" else "WHERE id = 1"
+    _raw(sqlite_file, f"UPDATE {table} SET {name} = {value} {condition}")
     with opened_database(sqlite_file, read_only=True) as engine, engine.connect() as connection:
         findings = check_database(connection)
         # the row itself is named, but where SQLite cannot even hand it out
         expected = "database" if "cast(" in value else table
-        assert expected in {found.table for found in findings}
+        assert expected in {finding.table for finding in findings}
         for look in (motion_rows, model_rows, combination_table, stored_combinations):
             try:
                 look(connection)
@@ -168,4 +168,4 @@ def test_every_prediction_verifies_its_model(tmp_path: Path, column: str) -> Non
     with pytest.raises(DatabaseError, match=f"model {row.name} is damaged .*its digest differs"):
         rbfrag.predict(3.0, 0.1, **shaking, db=path)
     with opened_database(path, read_only=True) as engine, engine.connect() as connection:
-        assert {found.table for found in check_database(connection)} == {"fragility_model"}
+        assert {finding.table for finding in check_database(connection)} == {"fragility_model"}

@@ -15,15 +15,14 @@ from typing import Any
 import pytest
 from sqlalchemy import Engine, func, select, text
 
+import rbfrag.db.engine
 import rbfrag.db.location
-import rbfrag.db.upgrade
 from rbfrag.db.connect import database_label, sqlalchemy_url
-from rbfrag.db.engine import open_database, opened_database
+from rbfrag.db.engine import open_database, opened_database, upgrade_database
 from rbfrag.db.insert import insert_row
 from rbfrag.db.location import VERSION_TABLE, locate
 from rbfrag.db.schema import suite
 from rbfrag.db.sqlite_file import LONGEST_WAIT_S
-from rbfrag.db.upgrade import upgrade_database
 from rbfrag.errors import (
     DatabaseBusyError,
     DatabaseError,
@@ -60,7 +59,7 @@ class TestLocation:
         assert locate(None) == Path("rbfrag.db")
 
     @pytest.mark.parametrize(
-        ("given", "url"),
+        ("database", "url"),
         [
             ("a b.db", "sqlite:///a b.db"),
             (Path("/x/y.db"), "sqlite:////x/y.db"),
@@ -71,12 +70,12 @@ class TestLocation:
             ("postgres://u@h/n", "postgresql+psycopg://u@h/n"),
         ],
     )
-    def test_url(self, given: str | Path, url: str) -> None:
-        found = sqlalchemy_url(locate(given))
-        assert found.render_as_string(hide_password=False) == url
+    def test_url(self, database: str | Path, url: str) -> None:
+        url_object = sqlalchemy_url(locate(database))
+        assert url_object.render_as_string(hide_password=False) == url
 
     @pytest.mark.parametrize(
-        "given",
+        "database",
         [
             "",
             "mysql://h/n",
@@ -86,9 +85,9 @@ class TestLocation:
             "postgresql://h:port/n",
         ],
     )
-    def test_rejected(self, given: str) -> None:
-        with pytest.raises(InputError, match="import-a-table" if "mysql" in given else None):
-            sqlalchemy_url(locate(given))
+    def test_rejected(self, database: str) -> None:
+        with pytest.raises(InputError, match="import-a-table" if "mysql" in database else None):
+            sqlalchemy_url(locate(database))
 
 
 class TestCreation:
@@ -108,13 +107,13 @@ class TestCreation:
     def test_an_interrupted_creation_leaves_nothing(
         self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     ) -> None:
-        real = rbfrag.db.upgrade.migrate
+        real = rbfrag.db.engine.migrate
 
         def interrupted(engine: Engine) -> None:
             real(engine)
             raise KeyboardInterrupt
 
-        monkeypatch.setattr(rbfrag.db.upgrade, "migrate", interrupted)
+        monkeypatch.setattr(rbfrag.db.engine, "migrate", interrupted)
         with pytest.raises(KeyboardInterrupt):
             open_database(tmp_path / "x.db", create=True)
         assert list(tmp_path.iterdir()) == []
@@ -122,14 +121,14 @@ class TestCreation:
     def test_a_killed_creation_leaves_no_database(self, tmp_path: Path) -> None:
         path = tmp_path / "x.db"
         code = (
-            "import os, signal, sys, rbfrag.db.upgrade as create\n"
+            "import os, signal, sys, rbfrag.db.engine as create\n"
             "from rbfrag.db.engine import open_database\n"
             "real = create.migrate\n"
             "create.migrate = lambda e: (real(e), os.kill(os.getpid(), signal.SIGKILL))\n"
             "open_database(sys.argv[1], create=True)\n"
         )
-        done = subprocess.run([sys.executable, "-c", code, str(path)], check=False)
-        assert done.returncode == -signal.SIGKILL
+        process = subprocess.run([sys.executable, "-c", code, str(path)], check=False)
+        assert process.returncode == -signal.SIGKILL
         assert not path.exists()
         with opened_database(path, create=True) as engine:
             assert _count(engine) == 0
@@ -138,15 +137,15 @@ class TestCreation:
         self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     ) -> None:
         path = tmp_path / "x.db"
-        real = rbfrag.db.upgrade.migrate
+        real = rbfrag.db.engine.migrate
 
         def overtaken(engine: Engine) -> None:
-            monkeypatch.setattr(rbfrag.db.upgrade, "migrate", real)
+            monkeypatch.setattr(rbfrag.db.engine, "migrate", real)
             with opened_database(path, create=True) as other, other.begin() as connection:
                 insert_row(connection, suite, {"name": "theirs"})
             real(engine)
 
-        monkeypatch.setattr(rbfrag.db.upgrade, "migrate", overtaken)
+        monkeypatch.setattr(rbfrag.db.engine, "migrate", overtaken)
         with opened_database(path, create=True) as engine:
             assert _count(engine) == 1
         assert [file.name for file in tmp_path.iterdir()] == ["x.db"]
@@ -284,15 +283,15 @@ class TestRefusals:
                     insert_row(connection, suite, {"name": "x" * 100_000})
             assert _count(engine) == 0
 
-    @pytest.mark.parametrize(("stated", "limit_s"), [("?connect_timeout=2", None), ("", 2.0)])
+    @pytest.mark.parametrize(("options", "limit_s"), [("?connect_timeout=2", None), ("", 2.0)])
     def test_server_that_accepts_and_never_answers(
-        self, stated: str, limit_s: float | None
+        self, options: str, limit_s: float | None
     ) -> None:
         pytest.importorskip("psycopg")
         token = LONGEST_WAIT_S.set(limit_s)
         try:
             with socket.create_server(("127.0.0.1", 0)) as silent:
-                url = f"postgresql://nobody@127.0.0.1:{silent.getsockname()[1]}/none{stated}"
+                url = f"postgresql://nobody@127.0.0.1:{silent.getsockname()[1]}/none{options}"
                 with pytest.raises(DatabaseNotFoundError, match=r"cannot reach .*timeout"):
                     open_database(url)
         finally:
@@ -386,13 +385,13 @@ def test_settings_of_a_writing_connection(sqlite_file: Path) -> None:
 
 def test_a_database_of_two_schemas_is_rejected(place: str) -> None:
     with opened_database(place, create=True) as engine, engine.begin() as connection:
-        connection.execute(text(f"ALTER TABLE {VERSION_TABLE} RENAME TO once"))
+        connection.execute(text(f"DROP TABLE {VERSION_TABLE}"))
         connection.execute(text(f"CREATE TABLE {VERSION_TABLE} (version_num VARCHAR(32))"))
-        connection.execute(text(f"INSERT INTO {VERSION_TABLE} VALUES ('0007'), ('0008')"))
+        connection.execute(text(f"INSERT INTO {VERSION_TABLE} VALUES ('0001'), ('0002')"))
     for use in (
         lambda: open_database(place),
         lambda: open_database(place, create=True),
         lambda: upgrade_database(place),
     ):
-        with pytest.raises(SchemaVersionError, match=r"has several schema versions, 0007, 0008"):
+        with pytest.raises(SchemaVersionError, match=r"has several schema versions, 0001, 0002"):
             use()

@@ -18,16 +18,15 @@ from rbfrag.db.campaigns import (
     insert_combinations,
     known_combinations,
     start_campaign,
+    stored_combination,
 )
-from rbfrag.db.check.database import check_database
-from rbfrag.db.digest import row_digests
+from rbfrag.db.check import check_database
 from rbfrag.db.engine import opened_database
-from rbfrag.db.keys import combination_key
-from rbfrag.db.merge.databases import merge_databases
+from rbfrag.db.keys import combination_key, row_digests
+from rbfrag.db.merge import merge_databases
 from rbfrag.db.motions import add_motion
 from rbfrag.db.queries import combination_table, outcome_grid
 from rbfrag.db.rows import EarthquakeInfo
-from rbfrag.db.stored_combination import stored_combination
 from rbfrag.errors import InputError
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.solver.results import NUMERICS_VERSION, OutcomeIntervals, SearchPoints
@@ -49,21 +48,21 @@ Store = Callable[..., list[str]]
 def store(make_motion: Any, make_result: Any) -> Store:
     """Store a combination of each p² of one motion, and return their keys."""
 
-    def stored(engine: Engine, *p2: float, searched: bool = True, **given: Any) -> list[str]:
+    def stored(engine: Engine, *p2: float, searched: bool = True, **values: Any) -> list[str]:
         motion: GroundMotion = make_motion()
-        changes = given.pop("changes", {})
+        changes = values.pop("changes", {})
         records = []
         with engine.begin() as connection:
             quake = EarthquakeInfo("E", guessed=False)
             motion_id, _ = add_motion(connection, motion, earthquake=quake, is_vertical=False)
             for value in p2:
-                own: dict[str, Any] = {"kind": "toppling" if searched else "falls", "p2": value}
-                own["block"] = None if searched else BLOCK
+                fields: dict[str, Any] = {"kind": "toppling" if searched else "falls", "p2": value}
+                fields["block"] = None if searched else BLOCK
                 settings = {"search_limit": 0.01} if searched else {}
                 key = combination_key(
                     motion_sha256=motion.sha256, dt_s=0.01, vertical_sha256=None,
                     polarity="forward", numerics_version=NUMERICS_VERSION, settings=settings,
-                    **own,
+                    **fields,
                 )  # fmt: skip
                 result = make_result(motion.pga_g, p2=value, k=0.1, **changes)
                 records.append(
@@ -74,8 +73,8 @@ def store(make_motion: Any, make_result: Any) -> Store:
                         result=result if searched else None,
                         settings=settings,
                         polarity="forward",
-                        **own,
-                        **given,
+                        **fields,
+                        **values,
                     )
                 )
             insert_combinations(connection, start_campaign(connection, {}), records)
@@ -89,13 +88,13 @@ def test_a_grid_beside_a_search(engine: Engine, store: Store) -> None:
     with engine.connect() as connection:
         table = combination_table(connection)
         ids = table.combination_id[::-1]
-        found = outcome_grid(connection, ids)
+        grid = outcome_grid(connection, ids)
         points = stored_combination(connection, table.natural_key[-1]).points
         assert check_database(connection) == []
-    np.testing.assert_array_equal(found.k_over_pga, [GRID.kr_over_pga] * 2)
-    np.testing.assert_array_equal(found.outcome, [[0.0, 0.0, np.nan, 1.0]] * 2)
-    np.testing.assert_array_equal(found.theta_n, [GRID.theta_n] * 2)
-    assert np.isnan(found.displacement_m).all()
+    np.testing.assert_array_equal(grid.k_over_pga, [GRID.kr_over_pga] * 2)
+    np.testing.assert_array_equal(grid.outcome, [[0.0, 0.0, np.nan, 1.0]] * 2)
+    np.testing.assert_array_equal(grid.theta_n, [GRID.theta_n] * 2)
+    assert np.isnan(grid.displacement_m).all()
     # 0.9 was run by the search as well, and is one block
     np.testing.assert_allclose(points.kr_over_pga, [0.9, 0.6, 0.3, 0.11, 0.1, 0.005])
 
@@ -112,8 +111,12 @@ def test_combinations_without_a_search(engine: Engine, store: Store) -> None:
         np.testing.assert_array_equal(
             outcome_grid(connection, table.combination_id).displacement_m, [slid]
         )
-        known = known_combinations(connection, [key])[key]
-        assert (known.gridded, known.mapped, known.reentrant) == (True, False, None)
+        combination = known_combinations(connection, [key])[key]
+        assert (combination.gridded, combination.mapped, combination.reentrant) == (
+            True,
+            False,
+            None,
+        )
         assert check_database(connection) == []
 
 
@@ -129,11 +132,11 @@ def test_a_grid_that_comes_later(engine: Engine, store: Store) -> None:
         with pytest.raises(InputError, match="unknown combination"):
             add_grids(connection, {"0" * 64: GRID})
     with engine.connect() as connection:
-        known = known_combinations(connection, [first, second])
-        assert [known[key].gridded for key in (first, second)] == [True, False]
-        found = outcome_grid(connection, [known[second].id, known[first].id])
-        assert np.isnan(found.k_over_pga[0]).all()
-        np.testing.assert_array_equal(found.k_over_pga[1], GRID.kr_over_pga)
+        combinations = known_combinations(connection, [first, second])
+        assert [combinations[key].gridded for key in (first, second)] == [True, False]
+        grid = outcome_grid(connection, [combinations[second].id, combinations[first].id])
+        assert np.isnan(grid.k_over_pga[0]).all()
+        np.testing.assert_array_equal(grid.k_over_pga[1], GRID.kr_over_pga)
         assert check_database(connection) == []
 
 
@@ -141,13 +144,13 @@ def test_a_map_that_comes_later(engine: Engine, store: Store, make_result: Any) 
     nothing = {"island_width": None, "kr_over_pga_resolved": None, "reentrant": None}
     (key,) = store(engine, 3.0, changes=nothing)
     with engine.begin() as connection:
-        known = known_combinations(connection, [key])[key]
-        assert (known.mapped, known.reentrant) == (False, None)
+        combination = known_combinations(connection, [key])[key]
+        assert (combination.mapped, combination.reentrant) == (False, None)
         mapped = make_result(0.5, intervals=MAP, reentrant=True, island_width=0.09)
         for _ in range(2):
             add_maps(connection, {key: mapped})
-        known = known_combinations(connection, [key])[key]
-        assert (known.mapped, known.reentrant) == (True, True)
+        combination = known_combinations(connection, [key])[key]
+        assert (combination.mapped, combination.reentrant) == (True, True)
         row = connection.execute(select(schema.combination)).mappings().one()
         assert row["island_width"] == 0.09
         assert check_database(connection) == []
@@ -169,16 +172,16 @@ def test_grids_and_maps_are_merged(
     assert added.get("simulation", 0) == (0 if ours_is_gridded else 4)
     with opened_database(sqlite_file, read_only=True) as engine, engine.connect() as connection:
         ids = combination_table(connection).combination_id
-        found = outcome_grid(connection, ids).k_over_pga
+        ratios = outcome_grid(connection, ids).k_over_pga
         assert check_database(connection) == []
-    np.testing.assert_allclose(found, [GRID.kr_over_pga], rtol=1e-14)
+    np.testing.assert_allclose(ratios, [GRID.kr_over_pga], rtol=1e-14)
     assert merge_databases(other, db=sqlite_file).added == {}
 
 
 def test_digests_are_those_of_values_as_they_are_stored() -> None:
-    (one,) = row_digests(["float", "boolean", "text"], [[2], [1], ["Zürich"]])
+    (digest,) = row_digests(["float", "boolean", "text"], [[2], [1], ["Zürich"]])
     (same,) = row_digests(["float", "boolean", "text"], [[np.float64(2.0)], [np.True_], ["Zürich"]])
-    assert one == same
+    assert digest == same
     zeros = row_digests(["float", "bytes"], [[0.0, -0.0, None], [b"", b"", b""]])
     assert zeros[0] == zeros[1] != zeros[2]
     # written down, since stored digests must be found again by every later version

@@ -15,19 +15,17 @@ import rbfrag.db.ledger
 from rbfrag.campaign.simulate import simulate
 from rbfrag.db import schema
 from rbfrag.db.campaigns import GRID_MEETS_POINT, POINT_COLUMNS
-from rbfrag.db.check.database import check_database, coverage
-from rbfrag.db.check.ledger import accept_rows, check_ledger
+from rbfrag.db.check import accept_rows, check_database, check_ledger, coverage, mark_sound
 from rbfrag.db.engine import open_database, opened_database
 from rbfrag.db.insert import delete_rows, insert_rows, table_digests
 from rbfrag.db.ledger import last_sound, stored_tallies, written_tallies
 from rbfrag.db.location import REFERENCE
-from rbfrag.db.merge.databases import merge_databases
+from rbfrag.db.merge import merge_databases
 from rbfrag.db.model_file import ModelRow
 from rbfrag.db.models import save_model
 from rbfrag.db.motions import add_motion
 from rbfrag.db.rows import EarthquakeInfo
-from rbfrag.db.upgrade import upgrade_database
-from rbfrag.errors import DatabaseError, SchemaVersionError
+from rbfrag.errors import DatabaseError, DatabaseReadOnlyError
 from rbfrag.motions.ground_motion import GroundMotion
 from tests.cli.conftest import Shell, shell
 
@@ -36,7 +34,9 @@ __all__ = ["shell"]
 
 def _problems(engine: Engine) -> list[tuple[str, str, str]]:
     with engine.connect() as connection:
-        return [(each.table, each.row, each.problem) for each in check_ledger(connection)]
+        return [
+            (finding.table, finding.row, finding.problem) for finding in check_ledger(connection)
+        ]
 
 
 @pytest.mark.parametrize("table", ["combination", "fragility_model", "simulation", "suite_motion"])
@@ -92,10 +92,10 @@ def test_added_and_replaced_rows_are_found(filled: Engine) -> None:
 def test_rows_whose_key_is_there_are_counted_once(filled: Engine, over: str) -> None:
     """The grid of a kind meets blocks that were run before, or another campaign was quicker."""
     with filled.begin() as connection:
-        one = connection.execute(select(schema.simulation).limit(1)).mappings().one()
-        number = one["combination_id"]
+        simulation = connection.execute(select(schema.simulation).limit(1)).mappings().one()
+        number = simulation["combination_id"]
         rows = [
-            (number, one["kr_over_pga"], 0.25, "stable", None, 3, None),
+            (number, simulation["kr_over_pga"], 0.25, "stable", None, 3, None),
             (number, 0.123, 0.5, "stable", None, 4, None),
         ]
         meeting = over or GRID_MEETS_POINT
@@ -104,7 +104,7 @@ def test_rows_whose_key_is_there_are_counted_once(filled: Engine, over: str) -> 
         assert written_tallies(connection) == stored_tallies(connection)
         changed = select(schema.simulation.c.grid).where(
             schema.simulation.c.combination_id == number,
-            schema.simulation.c.kr_over_pga == one["kr_over_pga"],
+            schema.simulation.c.kr_over_pga == simulation["kr_over_pga"],
         )
         assert connection.scalar(changed) == (None if over else 3)
 
@@ -144,22 +144,21 @@ def test_a_loss_that_is_known_is_accepted(place: str, filled: Engine, tmp_path: 
     assert _problems(filled)
     with pytest.raises(DatabaseError, match=r"damaged in 1 places.*rows were deleted"):
         merge_databases(place, db=tmp_path / "into.db")
-    assert [each.table for each in accept_rows(place)] == ["suite_motion"]
+    assert [row.table for row in accept_rows(place)] == ["suite_motion"]
     assert _problems(filled) == []
     assert accept_rows(place) == []
 
 
-def test_a_database_of_before_is_read_checked_and_upgraded(tmp_path: Path) -> None:
-    path = tmp_path / "old.db"
+def test_the_built_in_data_have_a_ledger_and_are_never_written(tmp_path: Path) -> None:
+    before = REFERENCE.read_bytes()
+    with pytest.raises(DatabaseReadOnlyError, match="the built-in data set is read-only: copy"):
+        open_database(REFERENCE)
+    mark_sound(REFERENCE, "2026-01-01T00:00:00+00:00")
+    assert REFERENCE.read_bytes() == before
+    path = tmp_path / "copy.db"
     shutil.copy(REFERENCE, path)
-    with opened_database(path, read_only=True) as engine, engine.connect() as connection:
-        assert "rbfrag db upgrade adds the ledger" in coverage(connection)
-        assert last_sound(connection) is None
-        assert list(check_ledger(connection)) == []
-    with pytest.raises(SchemaVersionError, match="rbfrag db upgrade"):
-        open_database(path)
-    assert upgrade_database(path) == ("0008", "0009")
     with opened_database(path) as engine, engine.begin() as connection:
+        assert last_sound(connection) is None
         assert written_tallies(connection) == stored_tallies(connection)
         assert "by the ledger" in coverage(connection)
         models = schema.fragility_model

@@ -15,24 +15,19 @@ from sqlalchemy import Engine, delete, func, select, true, update
 from benchmarks.database_content import CONTENT_TABLES, content_digest, table_rows_by_natural_key
 from rbfrag.db import schema
 from rbfrag.db.campaigns import start_campaign
-from rbfrag.db.check.database import check_database
-from rbfrag.db.check.maps import contradictions
+from rbfrag.db.check import check_database
+from rbfrag.db.check_results import contradictions
 from rbfrag.db.engine import open_database, opened_database
 from rbfrag.db.insert import insert_if_new, insert_row, renew_digests, update_rows
 from rbfrag.db.keys import response_key
 from rbfrag.db.ledger import renew_ledger
-from rbfrag.db.merge.databases import MergeReport, merge_databases
+from rbfrag.db.merge import MergeReport, merge_databases
 from rbfrag.db.model_file import ModelRow
 from rbfrag.db.models import load_model, model_rows, save_model
 from rbfrag.db.motions import add_motion
 from rbfrag.db.queries import database_info
 from rbfrag.db.rows import EarthquakeInfo
-from rbfrag.errors import (
-    DatabaseError,
-    DatabaseNotFoundError,
-    InputError,
-    MergeConflictError,
-)
+from rbfrag.errors import DatabaseError, DatabaseNotFoundError, InputError, MergeConflictError
 from rbfrag.motions.ground_motion import GroundMotion
 
 QUAKE = EarthquakeInfo("chi-chi-1999", magnitude=7.62, guessed=False)
@@ -42,9 +37,9 @@ QUAKE = EarthquakeInfo("chi-chi-1999", magnitude=7.62, guessed=False)
 def theirs(tmp_path: Path, empty_database: bytes) -> Iterator[Engine]:
     """Another team's database, in a file."""
     (tmp_path / "theirs.db").write_bytes(empty_database)
-    made = open_database(tmp_path / "theirs.db")
-    yield made
-    made.dispose()
+    engine = open_database(tmp_path / "theirs.db")
+    yield engine
+    engine.dispose()
 
 
 def _digest(engine: Engine) -> str:
@@ -114,10 +109,10 @@ class TestTogether:
             fill(connection, [3, 1])
         with theirs.begin() as connection:
             fill(connection, [2, 1])
-        with opened_database(tmp_path / "whole.db", create=True) as whole:
-            with whole.begin() as connection:
+        with opened_database(tmp_path / "whole.db", create=True) as complete:
+            with complete.begin() as connection:
                 fill(connection, [1, 2, 3])
-            expected = _digest(whole)
+            expected = _digest(complete)
         with opened_database(tmp_path / "copy.db", create=True) as copy:
             _merge(theirs, copy)
             _merge(engine, copy)
@@ -150,7 +145,7 @@ class TestTogether:
         for number, part in enumerate(parts):
             files.append(folder / f"{number}.db")
             files[-1].write_bytes(empty_database)
-            with opened_database(files[-1]) as one, one.begin() as connection:
+            with opened_database(files[-1]) as source, source.begin() as connection:
                 fill(connection, part)
         digests = set()
         for number in range(2):
@@ -158,19 +153,19 @@ class TestTogether:
             seed.shuffle(files)
             for file in files:
                 merge_databases(file, db=folder / f"all{number}.db")
-            with opened_database(folder / f"all{number}.db", read_only=True) as made:
-                digests.add(_digest(made))
+            with opened_database(folder / f"all{number}.db", read_only=True) as merged:
+                digests.add(_digest(merged))
         assert len(digests) == 1
 
     def test_a_database_is_made(self, filled: Engine, tmp_path: Path) -> None:
         merge_databases(_where(filled), db=tmp_path / "new.db")
-        with opened_database(tmp_path / "new.db", read_only=True) as made:
-            assert _digest(made) == _digest(filled)
+        with opened_database(tmp_path / "new.db", read_only=True) as merged:
+            assert _digest(merged) == _digest(filled)
 
     def test_rows_in_any_number(
         self, filled: Engine, theirs: Engine, monkeypatch: pytest.MonkeyPatch
     ) -> None:
-        monkeypatch.setattr("rbfrag.db.merge.results._AT_ONCE", 2)
+        monkeypatch.setattr("rbfrag.db.merge_rows._AT_ONCE", 2)
         _merge(filled, theirs)
         assert _digest(theirs) == _digest(filled)
 
@@ -334,8 +329,8 @@ class TestGuesses:
         self, engine: Engine, theirs: Engine, make_motion: Any
     ) -> None:
         self._motion(engine, make_motion(1), EarthquakeInfo("e", guessed=False))
-        said = EarthquakeInfo("e", name="Chi-Chi", magnitude=7.6, time="1999", guessed=False)
-        self._motion(theirs, make_motion(1), said)
+        earthquake = EarthquakeInfo("e", name="Chi-Chi", magnitude=7.6, time="1999", guessed=False)
+        self._motion(theirs, make_motion(1), earthquake)
         assert _merge(theirs, engine).warnings == ()
         assert _digest(engine) == _digest(theirs)
 
@@ -351,13 +346,13 @@ class TestGuesses:
             assert connection.scalar(select(schema.earthquake.c.name)) == "Chi-Chi"
 
 
-def _found(values: Any) -> Any:
+def _change_first_found(values: Any) -> Any:
     least = select(func.min(schema.combination.c.id)).where(schema.combination.c.status == "found")
     matching = schema.combination.c.id == least.scalar_subquery()
     return update(schema.combination).where(matching).values(**values)
 
 
-LAST_BITS = _found(
+LAST_BITS = _change_first_found(
     {
         name: schema.combination.c[name] * (1.0 + 1e-13)
         for name in ("kr_over_pga", "lower", "upper", "kr", "y_m_s")
@@ -474,11 +469,11 @@ class TestContradictions:
             merge_databases(_where(theirs), db=_where(filled))
 
     def test_maps(self) -> None:
-        one = [(0.01, 0.1, "topples"), (0.1, 0.2, "undecided"), (0.2, 1.0, "safe")]
+        scan = [(0.01, 0.1, "topples"), (0.1, 0.2, "undecided"), (0.2, 1.0, "safe")]
         near = [(0.01, 0.1 + 1e-12, "topples"), (0.1 + 1e-12, 1.0, "safe")]
-        assert list(contradictions(one, near)) == []
+        assert list(contradictions(scan, near)) == []
         other = [(0.01, 0.05, "safe"), (0.05, 0.3, "topples"), (0.3, 1.0, "safe")]
-        assert list(contradictions(one, other)) == [
+        assert list(contradictions(scan, other)) == [
             (0.01, 0.05, "topples", "safe"),
             (0.2, 0.3, "safe", "topples"),
         ]
@@ -553,7 +548,7 @@ class TestRefusals:
 
     def test_content_tables_are_all_merged(self, filled: Engine, theirs: Engine) -> None:
         # A table that a later schema adds must not be forgotten here.
-        assert len(CONTENT_TABLES) == 12
+        assert len(CONTENT_TABLES) == 14
         _merge(filled, theirs)
         for table in CONTENT_TABLES:
             with filled.connect() as a, theirs.connect() as b:

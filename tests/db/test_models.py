@@ -17,17 +17,10 @@ from hypothesis import strategies as st
 from sqlalchemy import Engine, update
 
 from rbfrag.db import schema
-from rbfrag.db.check.database import check_database
+from rbfrag.db.check import check_database
 from rbfrag.db.engine import opened_database
 from rbfrag.db.insert import table_digests
-from rbfrag.db.model_file import (
-    COLUMNS,
-    STORED,
-    ModelRow,
-    decode_model,
-    encode_model,
-    read_models,
-)
+from rbfrag.db.model_file import COLUMNS, STORED, ModelRow, decode_model, encode_model, read_models
 from rbfrag.db.models import load_model, model_rows, save_model, set_default
 from rbfrag.errors import (
     DatabaseError,
@@ -127,8 +120,8 @@ class TestStore:
             with pytest.raises(DatabaseError, match="model pgv-wls is damaged"):
                 load_model(connection)
             if column in ("coefficients", "covariance"):
-                found = {(finding.table, finding.row) for finding in check_database(connection)}
-                assert found == {("fragility_model", "pgv-wls"), ("fragility_model", "1")}
+                altered = {(finding.table, finding.row) for finding in check_database(connection)}
+                assert altered == {("fragility_model", "pgv-wls"), ("fragility_model", "1")}
 
 
 @given(st.dictionaries(st.text(), finite, max_size=4), st.data())
@@ -170,8 +163,12 @@ class TestFastReader:
 
     def test_unknown_names(self, stored: Path) -> None:
         raised = pytest.raises(UnknownModelError, match="another, pgv-wls")
-        with opened_database(stored, read_only=True) as engine, engine.connect() as found, raised:
-            load_model(found, "x")
+        with (
+            opened_database(stored, read_only=True) as engine,
+            engine.connect() as connection,
+            raised,
+        ):
+            load_model(connection, "x")
 
     def test_no_model_yet(self, sqlite_file: Path) -> None:
         raised = pytest.raises(UnknownModelError, match="rbfrag fit")
@@ -182,7 +179,7 @@ class TestFastReader:
     def test_while_another_process_writes(self, stored: Path, model: ModelRow) -> None:
         with opened_database(stored) as engine, engine.begin() as connection:
             save_model(connection, replace(model, name="unfinished", is_default=True))
-            assert [found.name for found in read_models(stored)] == ["another", "pgv-wls"]
+            assert [row.name for row in read_models(stored)] == ["another", "pgv-wls"]
         assert [m.name for m in read_models(stored) if m.is_default] == ["unfinished"]
 
     def test_in_a_folder_that_cannot_be_written(self, locked_folder: Any, model: ModelRow) -> None:
@@ -219,11 +216,11 @@ class TestFastReader:
             "assert read_models(sys.argv[1])[1].name == 'pgv-wls'\n"
             f"print(sorted(set({HEAVY!r}) & set(sys.modules)))"
         )
-        done = subprocess.run(
+        process = subprocess.run(
             [sys.executable, "-c", code, str(stored)],
             capture_output=True,
             text=True,
             check=True,
             env={**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
         )
-        assert done.stdout.strip() == "[]"
+        assert process.stdout.strip() == "[]"

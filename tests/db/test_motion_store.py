@@ -23,7 +23,7 @@ from rbfrag.motions.ground_motion import GroundMotion
 MakeMotion = Callable[..., GroundMotion]
 
 GUESS = EarthquakeInfo("CHRISTCHURCH 2011")
-STATED = EarthquakeInfo("christchurch-2011", "Christchurch", 6.2, "2011-02-21", guessed=False)
+QUAKE = EarthquakeInfo("christchurch-2011", "Christchurch", 6.2, "2011-02-21", guessed=False)
 
 samples_g = hnp.arrays(
     np.float64,
@@ -62,7 +62,7 @@ def test_all_labels_come_back(engine: Engine, make_motion: MakeMotion) -> None:
         motion_id, new = add_motion(
             connection,
             motion,
-            earthquake=STATED,
+            earthquake=QUAKE,
             is_vertical=False,
             processing="corrected",
             flags=["low_amplitude"],
@@ -125,7 +125,7 @@ def test_what_is_stated_replaces_the_guess(engine: Engine, make_motion: MakeMoti
         again = add_motion(
             connection,
             make_motion(),
-            earthquake=STATED,
+            earthquake=QUAKE,
             is_vertical=True,
             recording="group",
             station="HVS",
@@ -134,7 +134,7 @@ def test_what_is_stated_replaces_the_guess(engine: Engine, make_motion: MakeMoti
         )
         row = motion_row(connection, motion_id)
     assert again == (motion_id, False)
-    assert (row.event_id, row.event_guessed, row.is_vertical) == (STATED.event_id, False, True)
+    assert (row.event_id, row.event_guessed, row.is_vertical) == (QUAKE.event_id, False, True)
     assert (row.recording, row.station, row.component) == ("group", "HVS", "UP")
     assert (row.processing, row.flags) == ("corrected", ())
     assert (_rows(engine, "earthquake"), _rows(engine, "recording")) == (1, 1)
@@ -142,7 +142,7 @@ def test_what_is_stated_replaces_the_guess(engine: Engine, make_motion: MakeMoti
 
 def test_a_guess_replaces_nothing(engine: Engine, make_motion: MakeMotion) -> None:
     with engine.begin() as connection:
-        motion_id, _ = add_motion(connection, make_motion(), earthquake=STATED, is_vertical=False)
+        motion_id, _ = add_motion(connection, make_motion(), earthquake=QUAKE, is_vertical=False)
         before = motion_row(connection, motion_id)
         add_motion(connection, make_motion(), earthquake=GUESS, is_vertical=True, recording="x")
         assert motion_row(connection, motion_id) == before
@@ -152,9 +152,9 @@ def test_a_guess_replaces_nothing(engine: Engine, make_motion: MakeMotion) -> No
 def test_a_guess_of_the_same_spelling_is_not_merged(
     engine: Engine, make_motion: MakeMotion
 ) -> None:
-    guess = replace(STATED, guessed=True)
+    guess = replace(QUAKE, guessed=True)
     with engine.begin() as connection:
-        add_motion(connection, make_motion(1), earthquake=STATED, is_vertical=False)
+        add_motion(connection, make_motion(1), earthquake=QUAKE, is_vertical=False)
         add_motion(connection, make_motion(2), earthquake=guess, is_vertical=False)
         guessed = [row.event_guessed for row in motion_rows(connection)]
     assert guessed == [False, True]
@@ -178,12 +178,12 @@ def test_unknown_events_are_not_one_event(engine: Engine, make_motion: MakeMotio
 
 def test_stated_events_that_differ_are_rejected(engine: Engine, make_motion: MakeMotion) -> None:
     with engine.begin() as connection:
-        add_motion(connection, make_motion(), earthquake=STATED, is_vertical=False)
-        other = replace(STATED, event_id="darfield-2010")
+        add_motion(connection, make_motion(), earthquake=QUAKE, is_vertical=False)
+        other = replace(QUAKE, event_id="darfield-2010")
         with pytest.raises(InputError, match=r"0\.txt.*christchurch-2011.*darfield-2010"):
             add_motion(connection, make_motion(), earthquake=other, is_vertical=False)
         with pytest.raises(InputError, match="a horizontal component"):
-            add_motion(connection, make_motion(), earthquake=STATED, is_vertical=True)
+            add_motion(connection, make_motion(), earthquake=QUAKE, is_vertical=True)
 
 
 def test_magnitude_is_filled_in_and_the_first_one_stays(
@@ -236,7 +236,7 @@ def test_names_that_are_no_text_are_stored_visibly(engine: Engine, make_motion: 
 def test_impossible_magnitudes_are_rejected(
     engine: Engine, make_motion: MakeMotion, magnitude: float
 ) -> None:
-    quake = replace(STATED, magnitude=magnitude)
+    quake = replace(QUAKE, magnitude=magnitude)
     with (
         engine.begin() as connection,
         pytest.raises(InputError, match=r"christchurch-2011.*not a valid magnitude"),

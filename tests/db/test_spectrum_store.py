@@ -9,9 +9,9 @@ import pytest
 from sqlalchemy import Engine
 
 from benchmarks.database_content import content_digest
+from rbfrag.db.campaigns import spectrum_values, store_spectrum
 from rbfrag.db.motions import add_motion
 from rbfrag.db.rows import EarthquakeInfo
-from rbfrag.db.spectra import spectrum_values, store_spectrum
 from rbfrag.motions.ground_motion import GroundMotion
 
 QUAKE = EarthquakeInfo("chi-chi-1999", magnitude=7.62, guessed=False)
@@ -62,8 +62,8 @@ def test_versions_do_not_mix(engine: Engine, motion_id: int) -> None:
                 x_m_s=[x],
                 numerics_version=version,
             )
-        found = spectrum_values(connection, numerics_version="new")
-        assert found == {(motion_id, "forward", 3.0): 0.6}
+        values = spectrum_values(connection, numerics_version="new")
+        assert values == {(motion_id, "forward", 3.0): 0.6}
 
 
 def test_is_part_of_the_content(engine: Engine, motion_id: int) -> None:

@@ -47,12 +47,12 @@ def folder(tmp_path_factory: pytest.TempPathFactory, formats_dir: Path) -> Path:
 
 
 def test_the_answers_of_the_pages_are_the_program_s(folder: Path) -> None:
-    wrong = [f"{each.page}: {each.typed}\n{answer}" for each, answer in CONSOLE.differing(folder)]
+    wrong = [f"{item.page}: {item.typed}\n{answer}" for item, answer in CONSOLE.differing(folder)]
     assert not wrong, "\n".join((*wrong, "python docs/console_blocks.py writes them anew"))
 
 
 @pytest.mark.parametrize(
-    "page", [page for page, found in PYTHON.items() if found], ids=lambda p: p.name
+    "page", [page for page, result in PYTHON.items() if result], ids=lambda p: p.name
 )
 def test_the_python_of_the_pages_runs(
     page: Path, folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch

@@ -1,4 +1,4 @@
-"""What the documentation says can be typed, exists."""
+"""Commands and names in the documentation exist."""
 
 from __future__ import annotations
 
@@ -60,11 +60,11 @@ def command_lines(text: str) -> Iterator[list[str]]:
 
 def complaint(words: list[str]) -> str | None:
     """Return what is wrong with a command line, or None."""
-    known = commands()
+    all_commands = commands()
     depth = 1
-    while depth < len(words) and tuple(words[: depth + 1]) in known:
+    while depth < len(words) and tuple(words[: depth + 1]) in all_commands:
         depth += 1
-    command = known[tuple(words[:depth])]
+    command = all_commands[tuple(words[:depth])]
     rest = words[depth:]
     if hasattr(command, "list_commands") and rest and not rest[0].startswith("-"):
         return f"no command {' '.join(words[: depth + 1])}"
@@ -197,6 +197,6 @@ def test_readme_states_the_speeds_that_were_measured() -> None:
 def test_hard_cases_are_counted_as_their_table_has_them() -> None:
     page = (ROOT / "docs" / "evidence" / "hard-cases.md").read_text(encoding="utf-8")
     table = [row for row in rows_of(page) if row[0].startswith("`") and row[3].isdigit()]
-    tried, wrong, within, others = (sum(int(row[at]) for row in table) for at in range(3, 7))
+    tried, wrong, within, undecided = (sum(int(row[at]) for row in table) for at in range(3, 7))
     assert f"Of {tried:,} cases {within:,} came out" in page
-    assert f"or certified, {wrong} wrong. {others} got no such claim" in page
+    assert f"or certified, {wrong} wrong. {undecided} got no such claim" in page

@@ -17,7 +17,7 @@ pytestmark = pytest.mark.skipif(os.name != "posix", reason="asks whether a proce
 
 KILLED = """
 import os, signal, sys
-from rbfrag.db import upgrade
+from rbfrag.db import engine as upgrade
 from rbfrag.db.engine import open_database
 migrate = upgrade.migrate
 def killed(engine):
@@ -47,7 +47,7 @@ def test_the_next_start_removes_the_draft_of_a_dead_process(tmp_path: Path, mome
 
 
 def test_the_draft_of_a_living_process_stays(tmp_path: Path) -> None:
-    from rbfrag.db.upgrade import _draft_prefix
+    from rbfrag.db.engine import _draft_prefix
 
     place = tmp_path / "a.db"
     draft = tmp_path / f"{_draft_prefix(place, os.getppid())}x.new"

@@ -33,10 +33,10 @@ def test_a_quota(database: Path, undisturbed: str) -> None:
     def limit() -> None:
         resource.setrlimit(resource.RLIMIT_FSIZE, (room, room))
 
-    done = _run(database, preexec_fn=limit)
-    assert done.returncode == 1
-    assert "Traceback" not in done.stderr
-    last = done.stderr.strip().splitlines()[-1]
+    process = _run(database, preexec_fn=limit)
+    assert process.returncode == 1
+    assert "Traceback" not in process.stderr
+    last = process.stderr.strip().splitlines()[-1]
     assert last.startswith(f"rbfrag: {database} cannot be read or written")
     assert "what was finished is kept" in last
     assert 0 < stored(str(database)) < 24
@@ -65,13 +65,13 @@ def small_disk(tmp_path: Path) -> Iterator[Path]:
 def test_no_space_left(small_disk: Path, untouched: bytes, undisturbed: str) -> None:
     place = small_disk / "a.db"
     place.write_bytes(untouched)
-    free = os.statvfs(small_disk)
+    free_standing = os.statvfs(small_disk)
     ballast = small_disk / "ballast"
-    ballast.write_bytes(b"0" * (free.f_bavail * free.f_bsize - 200 * 1024))
-    done = _run(place)
-    assert done.returncode == 1
-    assert "Traceback" not in done.stderr
-    last = done.stderr.strip().splitlines()[-1]
+    ballast.write_bytes(b"0" * (free_standing.f_bavail * free_standing.f_bsize - 200 * 1024))
+    process = _run(place)
+    assert process.returncode == 1
+    assert "Traceback" not in process.stderr
+    last = process.stderr.strip().splitlines()[-1]
     assert last.startswith(f"rbfrag: {place} cannot grow: the disk is full; what was finished")
     assert 0 < stored(str(place)) < 24
     ballast.unlink()

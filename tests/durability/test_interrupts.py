@@ -24,14 +24,14 @@ from benchmarks.durability import (
     stored,
     workers_of,
 )
-from rbfrag.campaign.interrupt import STOPPING
+from rbfrag.campaign.executors import STOPPING
 from rbfrag.campaign.simulate import simulate
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="finds the workers under /proc")
 
 MOTIONS, SAMPLES = 250, 2400  # so much that a busy test still finds the campaign at work
 SIZES = (10.0, 1.0)
-WHOLE = MOTIONS * 2 * len(SIZES)
+COMPLETE = MOTIONS * 2 * len(SIZES)
 
 
 @pytest.fixture(scope="module")
@@ -73,16 +73,16 @@ def running(place: Path, jobs: int) -> Iterator[subprocess.Popen[bytes]]:
 
 
 def said_until(process: subprocess.Popen[bytes], words: str) -> str:
-    """What a process has written to standard error as soon as it holds some words."""
+    """Return the standard error of a process as soon as it holds some words."""
     assert process.stderr is not None
-    said, end = b"", time.monotonic() + PATIENCE_S
-    while words.encode() not in said:
-        assert time.monotonic() < end, said
+    message, end = b"", time.monotonic() + PATIENCE_S
+    while words.encode() not in message:
+        assert time.monotonic() < end, message
         if select.select([process.stderr], [], [], 0.1)[0]:
             part = os.read(process.stderr.fileno(), 4096)
-            assert part, said
-            said += part
-    return said.decode()
+            assert part, message
+            message += part
+    return message.decode()
 
 
 def interrupt(process: subprocess.Popen[bytes], *, group: bool) -> None:
@@ -97,14 +97,14 @@ def test_once_ends_after_the_motion_in_hand(place: Path, jobs: int) -> None:
         said_until(process, STOPPING)
         rest = process.communicate(timeout=PATIENCE_S)[1].decode()
     assert process.returncode == 130
-    done = stored(str(place))
-    assert 0 < done < WHOLE
-    assert done % (2 * len(SIZES)) == 0  # whole motions
-    assert re.search(rf"stopped: {done} of {WHOLE} stored; the same command goes on", rest)
+    completed = stored(str(place))
+    assert 0 < completed < COMPLETE
+    assert completed % (2 * len(SIZES)) == 0  # whole motions
+    assert re.search(rf"stopped: {completed} of {COMPLETE} stored; the same command goes on", rest)
     assert "Traceback" not in rest
     summary = simulate(place, p2=SIZES, jobs=1)
-    assert summary.resumed == done
-    assert stored(str(place)) == WHOLE
+    assert summary.resumed == completed
+    assert stored(str(place)) == COMPLETE
 
 
 @pytest.mark.parametrize("group", [True, False])
@@ -125,13 +125,13 @@ def test_twice_ends_at_once(place: Path, jobs: int, group: bool, pause_s: float)
         while any(Path(f"/proc/{pid}/cmdline").exists() for pid in workers):
             assert time.monotonic() < end, "a worker goes on"
             time.sleep(0.02)
-    assert 0 < stored(str(place)) <= WHOLE
+    assert 0 < stored(str(place)) <= COMPLETE
     digest(str(place))  # passes the check of the database
 
 
 IN_A_KERNEL = """
 import hashlib
-from rbfrag.campaign.interrupt import stopped_by_interrupts
+from rbfrag.campaign.executors import stopped_by_interrupts
 with stopped_by_interrupts():
     print("ready", flush=True)
     # like a kernel: it gives up the lock of the interpreter, and looks at no signal

@@ -11,7 +11,7 @@ import pytest
 
 from benchmarks.durability import digest, kill_once, make_database, stored
 from rbfrag.campaign.simulate import simulate
-from rbfrag.db.merge.databases import merge_databases
+from rbfrag.db.merge import merge_databases
 from tests.durability.conftest import P2
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="finds the workers under /proc")
@@ -49,7 +49,7 @@ def test_a_killed_campaign_ends_equal(place: str, many: Path, expected: str) -> 
                 assert kill.status == -signal.SIGKILL
             else:
                 assert kill.status == 1
-                assert kill.said.startswith("rbfrag: a worker process died")
+                assert kill.output.startswith("rbfrag: a worker process died")
             assert before <= kill.combinations <= stored(place)
             assert stored(place) % 4 == 0  # whole motions
     assert kills, "the campaign was over before the first kill"

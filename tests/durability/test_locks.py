@@ -21,7 +21,7 @@ from benchmarks.durability import campaign, digest, environment, stored
 from rbfrag.campaign.simulate import CampaignProgress, simulate
 from rbfrag.db import connection_watchdog
 from rbfrag.db.engine import opened_database
-from rbfrag.db.merge.databases import merge_databases
+from rbfrag.db.merge import merge_databases
 from rbfrag.errors import DatabaseBusyError, DatabaseFailedError
 from tests.cli.conftest import Rejects, Shell, rejects, shell
 from tests.durability.conftest import P2
@@ -102,11 +102,11 @@ def test_a_server_that_gives_up_half_way(
     calls = []
 
     def interrupted(*arguments: object) -> int:
-        done = insert(*arguments)  # type: ignore[arg-type]
-        calls.append(done)
+        process = insert(*arguments)  # type: ignore[arg-type]
+        calls.append(process)
         if len(calls) == 3:
             _end_sessions(on_server)  # ours holds locks: it is in its transaction
-        return done
+        return process
 
     monkeypatch.setattr(module, "insert_combinations", interrupted)
     with pytest.raises(DatabaseFailedError, match="what was finished is kept"):
@@ -150,8 +150,8 @@ def test_two_campaigns_at_once(
         for p2 in ("10,1", "1,10")
     ]  # fmt: skip
     for process in running:
-        said = process.communicate(timeout=300)
-        assert process.returncode == 0, said
+        message = process.communicate(timeout=300)
+        assert process.returncode == 0, message
     assert stored(place) == 24
     assert digest(place) == undisturbed
 
@@ -256,9 +256,9 @@ def stalling_proxy(port: int) -> Iterator[tuple[int, threading.Event]]:
     server = socket.create_server(("127.0.0.1", 0))
     wires = []
 
-    def forward(one: socket.socket, other: socket.socket) -> None:
+    def forward(first: socket.socket, other: socket.socket) -> None:
         with suppress(OSError):
-            while data := one.recv(1 << 16):
+            while data := first.recv(1 << 16):
                 if not stalls.is_set():
                     other.sendall(data)
 

@@ -9,7 +9,9 @@ import subprocess
 import tempfile
 import time
 from collections.abc import Callable, Iterator
+from contextlib import closing
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import pytest
 
@@ -24,11 +26,14 @@ from benchmarks.durability import (
 )
 from benchmarks.running_service import free_port
 from rbfrag.campaign.simulate import CampaignProgress, simulate
-from rbfrag.db.merge.databases import merge_databases
+from rbfrag.db.merge import merge_databases
 from rbfrag.errors import DatabaseFailedError
 
+if TYPE_CHECKING:
+    import psycopg
+
 P2, MOTIONS, SAMPLES = "10,1", 40, 1200
-WHOLE = MOTIONS * 4
+COMPLETE = MOTIONS * 4
 Server = tuple[str, Callable[..., None]]
 PROGRAM = shutil.which("pg_ctl") or next(Path("/usr/lib/postgresql").glob("*/bin/pg_ctl"), None)
 pytestmark = pytest.mark.skipif(
@@ -83,14 +88,24 @@ def server() -> Iterator[Server]:
 
 
 def resumed(place: str, undisturbed: str) -> None:
-    done = stored(place)
-    assert 8 <= done < WHOLE
+    process = stored(place)
+    assert 8 <= process < COMPLETE
     run_to_the_end(place, P2, 2)
-    assert stored(place) == WHOLE
+    assert stored(place) == COMPLETE
     assert digest(place) == undisturbed
 
 
+def rows_when_locked(connection: psycopg.Connection) -> int:
+    """Lock the table of combinations against further rows, and return how many there are."""
+    connection.execute("LOCK TABLE combination IN EXCLUSIVE MODE")
+    row = connection.execute("SELECT count(*) FROM combination").fetchone()
+    assert row is not None
+    return int(row[0])
+
+
 def test_a_server_that_is_restarted(server: Server, motions: Path, undisturbed: str) -> None:
+    import psycopg
+
     place, control = server
     merge_databases(motions, db=place)
     with subprocess.Popen(
@@ -98,18 +113,21 @@ def test_a_server_that_is_restarted(server: Server, motions: Path, undisturbed: 
         stderr=subprocess.PIPE, text=True,
     ) as running:  # fmt: skip
         try:
-            end = time.monotonic() + PATIENCE_S
-            while stored(place) < 8:
-                assert running.poll() is None
-                assert time.monotonic() < end
-            control("restart", "-m", "immediate")
-            said = running.communicate(timeout=PATIENCE_S)[1]
+            with closing(psycopg.connect(place)) as connection:
+                end = time.monotonic() + PATIENCE_S
+                while rows_when_locked(connection) < 8:
+                    connection.rollback()
+                    assert running.poll() is None
+                    assert time.monotonic() < end
+                # while this transaction has its lock, the campaign cannot end before the restart
+                control("restart", "-m", "immediate")
+            message = running.communicate(timeout=PATIENCE_S)[1]
         finally:
             running.kill()
     assert running.returncode == 1
-    assert "the server gave up" in said
-    assert said.rstrip().endswith("what was finished is kept: run the same command again")
-    assert all(re.match("simulate: |rbfrag: ", line) for line in said.splitlines()), said
+    assert "the server gave up" in message
+    assert message.rstrip().endswith("what was finished is kept: run the same command again")
+    assert all(re.match("simulate: |rbfrag: ", line) for line in message.splitlines()), message
     resumed(place, undisturbed)
 
 

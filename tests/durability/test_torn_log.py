@@ -9,7 +9,7 @@ from pathlib import Path
 from benchmarks.database_content import table_rows_by_natural_key
 from benchmarks.durability import digest
 from rbfrag.campaign.simulate import CampaignProgress, simulate
-from rbfrag.db.check.database import check_database
+from rbfrag.db.check import check_database
 from rbfrag.db.engine import opened_database
 from tests.durability.conftest import MOTIONS, P2
 
@@ -52,8 +52,8 @@ def test_any_cut_leaves_what_was_there_before(
         name = f"cut{number}"
         rows = _rows_of(torn, name, log[:cut])
         sizes.append(len(rows["combination"]))
-        for table, kept in rows.items():
-            assert kept <= everything[table]
+        for table, retained in rows.items():
+            assert retained <= everything[table]
         if number % 8 == 0:
             simulate(torn / f"{name}.db", p2=P2, jobs=1)
             assert digest(str(torn / f"{name}.db")) == undisturbed

@@ -45,13 +45,13 @@ def database(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def run(script: str, *arguments: str | Path) -> str:
-    done = subprocess.run(
+    process = subprocess.run(
         [sys.executable, EXAMPLES / script, *arguments],
         capture_output=True, text=True, check=False, timeout=300,
         env={**os.environ, "PYTHONPATH": str(ROOT)},
     )  # fmt: skip
-    assert done.returncode == 0, done.stderr
-    return done.stdout
+    assert process.returncode == 0, process.stderr
+    return process.stdout
 
 
 def test_annual_loss(database: Path) -> None:
@@ -77,8 +77,8 @@ def test_any_fall_on_the_road(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -
     assert 1.1 <= low < high <= 4.3
     sites = [percent(line) for line in lines if ".csv falls:" in line]
     assert len(sites) == 2
-    for known, together, apart in sites:
-        assert together < known < apart
+    for site, together, apart in sites:
+        assert together < site < apart
     assert (low, high) == pytest.approx((sites[0][0], sites[0][0] + sites[1][0]), abs=0.11)
     (wrong,) = percent(next(line for line in lines if line.startswith("not ")))
     assert wrong > 4 * high
@@ -110,8 +110,8 @@ def test_refit_with_pandas(database: Path) -> None:
     assert match
     # strong shaking brings down strong blocks, about in proportion
     assert 0.5 < float(match.group(2)) < 1.5
-    found = rbfrag.read_table("combination", db=str(database)).query("status == 'found'")
-    assert f"{len(found)} critical blocks of 12 earthquakes" in printed
+    result = rbfrag.read_table("combination", db=str(database)).query("status == 'found'")
+    assert f"{len(result)} critical blocks of 12 earthquakes" in printed
 
 
 def test_refit_with_pandas_on_the_reference() -> None:
@@ -175,11 +175,11 @@ def test_the_engine_and_pelicun_get_what_we_answer() -> None:
     python = os.environ.get("RBFRAG_TEST_TOOLS_PYTHON")
     if not python:
         pytest.skip("RBFRAG_TEST_TOOLS_PYTHON names no Python that has openquake-engine, pelicun")
-    done = subprocess.run(
+    process = subprocess.run(
         [sys.executable, "-m", "benchmarks.interoperability", python],
         cwd=ROOT, capture_output=True, text=True, check=False,
     )  # fmt: skip
-    assert done.returncode == 0, done.stdout + done.stderr
+    assert process.returncode == 0, process.stdout + process.stderr
 
 
 def test_pelicun(database: Path, tmp_path: Path) -> None:
@@ -197,10 +197,10 @@ def test_pelicun(database: Path, tmp_path: Path) -> None:
     table = library / "fragility.csv"
     subprocess.run([python, "-c", READ_BACK, tmp_path], check=True, capture_output=True, text=True)
     for pgv in (0.5, 0.7, 0.9):
-        done = subprocess.run(
+        process = subprocess.run(
             [python, EXAMPLES / "pelicun_damage.py", table, str(pgv)],
             capture_output=True, text=True, check=True,
         )  # fmt: skip
         p = rbfrag.predict(3.0, 0.1, pgv_m_s=pgv, db=str(database)).probability
-        share = float(done.stdout.split()[-1])
+        share = float(process.stdout.split()[-1])
         assert share == pytest.approx(p, abs=4.0 * (p * (1 - p) / 20_000) ** 0.5 + 1e-3)

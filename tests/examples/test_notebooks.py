@@ -21,7 +21,7 @@ def printed(notebook: Any) -> list[str]:
     """Return what each cell prints; tables and figures are left out."""
     cells = (cell for cell in notebook.cells if cell.cell_type == "code")
     return [
-        "".join(each["text"] for each in cell.outputs if each.output_type == "stream")
+        "".join(output["text"] for output in cell.outputs if output.output_type == "stream")
         for cell in cells
     ]
 
@@ -37,7 +37,7 @@ def test_a_notebook_prints_what_is_stored_in_it(
     before = printed(stored)
     assert any(before)
     assert any(
-        "image/png" in each.get("data", {}) for c in stored.cells for each in c.get("outputs", ())
+        "image/png" in item.get("data", {}) for c in stored.cells for item in c.get("outputs", ())
     )
     NotebookClient(
         stored, timeout=300, resources={"metadata": {"path": str(path.parent)}}
@@ -48,5 +48,5 @@ def test_a_notebook_prints_what_is_stored_in_it(
 
 
 def test_the_notebooks_are_there_and_small() -> None:
-    assert len(NOTEBOOKS) == 3
+    assert len(NOTEBOOKS) == 4
     assert max(path.stat().st_size for path in NOTEBOOKS) <= LARGEST_BYTES

@@ -105,10 +105,8 @@ def write_datastore(
             file["events"] = np.array(stored, dtype=list(names))
             file["weights"] = np.array(WEIGHTS, "f4")
             times = (None, None) if scenario else (TIME, SETS)
-            stated = dict(
-                zip(("investigation_time", "ses_per_logic_tree_path"), times, strict=True)
-            )
-            file["oqparam"] = json.dumps(stated)
+            value = dict(zip(("investigation_time", "ses_per_logic_tree_path"), times, strict=True))
+            file["oqparam"] = json.dumps(value)
         if changed is not None:
             changed(file)
     return path

@@ -3,22 +3,27 @@
 from __future__ import annotations
 
 from itertools import pairwise
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from scipy.stats import norm
+from scipy.stats import binom, norm
 
 import rbfrag
 from rbfrag.db.location import REFERENCE
 from rbfrag.db.model_file import read_models
 from rbfrag.errors import InputError
-from rbfrag.exchange.block_fragility import FLOOR, TOP, block_functions
+from rbfrag.exchange.block_fragility import DRAWS, FLOOR, TOP, block_functions, share_functions
 from rbfrag.exchange.fragility_function import FragilityFunction, chords, renamed
+from rbfrag.exchange.nrml import nrml_text, read_nrml
 from rbfrag.fragility.measures import ALONE, TERMS
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.question.components import COMPONENTS, Component
+from rbfrag.question.question import predict
+from tests.fragility.conftest import model as model
 from tests.fragility.conftest import model_row
+from tests.fragility.conftest import row as row
 
 ALLOWED = 0.01
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(300)
@@ -133,7 +138,7 @@ def test_a_pair_of_levels_shows_where_the_ground_begins_to_lift() -> None:
 def test_the_mean_of_blocks_has_the_jump_of_each(component: str) -> None:
     model, few = pga_model(), slice(0, 5)
     numbers = {"p2": np.full(5, 50.0), "kr": np.linspace(0.1, 0.3, 5)}
-    each = block_functions(
+    separate = block_functions(
         list("abcde"), numbers, "pga_g", model=model, component=component, levels=400
     ).functions
     (mean,) = block_functions(
@@ -142,7 +147,7 @@ def test_the_mean_of_blocks_has_the_jump_of_each(component: str) -> None:
     assert mean.levels is not None
     x = np.geomspace(mean.levels[1], 5.0, 2000)
     near = np.abs(x[:, None] / numbers["kr"][few] - 1.0).min(axis=1) < 1e-4
-    p = np.mean([function.at(x) for function in each], axis=0)
+    p = np.mean([function.at(x) for function in separate], axis=0)
     assert relative_error(mean, x[~near], p[~near]) < ALLOWED
 
 
@@ -171,6 +176,75 @@ def test_names_that_a_tool_rejects_are_written_otherwise() -> None:
     kind = functions_of(pga_model(), "pga_g")[0].kind
     functions = [FragilityFunction(name, "toppled", kind) for name in ("a#1", "b", "c'd\"")]
     named, (warning,) = renamed(functions, "#'\"", "_", "the engine rejects")
-    assert [each.name for each in named] == ["a_1", "b", "c_d_"]
+    assert [item.name for item in named] == ["a_1", "b", "c_d_"]
     assert "2 of 3 IDs" in warning
     assert "'a#1' is written as 'a_1'" in warning
+
+
+X = np.linspace(0.3, 1.4, 40)
+SPREAD = 4.0 * 0.5 / np.sqrt(DRAWS)
+LENGTHS = {"l_e": 1.0, "l_v": 1.0, "l_o": 1.0, "l_y": 0.5}
+
+
+def of(model: object, p2: object, kr: object, shares: list[float]) -> list[FragilityFunction]:
+    return share_functions("m", np.asarray(p2, float), np.asarray(kr, float), "pgv_m_s", shares,
+                           levels=400, model=model).functions  # type: ignore[arg-type]  # fmt: skip
+
+
+def test_shares_add_up_to_the_mean(model: FragilityModel) -> None:
+    random = np.random.default_rng(2)
+    p2, kr = 10.0 ** random.uniform(0.0, 1.0, 20), random.uniform(0.06, 0.2, 20)
+    functions = of(model, p2, kr, [5.0 * k for k in range(1, 21)])
+    separate = predict(p2[:, None], kr[:, None], pgv_m_s=X, model=model).probability
+    mean = np.mean([function.at(X) for function in functions], axis=0)
+    assert mean == pytest.approx(separate.mean(axis=0), abs=SPREAD)
+
+
+def test_limit_states_rise_and_do_not_cross(model: FragilityModel, tmp_path: Path) -> None:
+    p2, kr = np.full(150, 3.0), np.linspace(0.06, 0.2, 150)
+    functions = of(model, p2, kr, [1.0, 10.0, 50.0])
+    path = tmp_path / "a.xml"
+    path.write_text(nrml_text(functions))
+    back = read_nrml(path)
+    assert [f.limit_state for f in back] == [f"failed_{s}_percent" for s in (1, 10, 50)]
+    values = np.array([f.at(np.geomspace(0.05, 5.0, 300)) for f in back])
+    assert (np.diff(values, axis=1) >= 0.0).all()
+    assert (np.diff(values, axis=0) <= 0.0).all()
+    assert values[0].max() - values[2].max() < 0.05
+    assert (values[0] - values[2]).max() > 0.2
+
+
+def test_equal_blocks_fail_together(model: FragilityModel) -> None:
+    functions = of(model, np.full(30, 3.0), np.full(30, 0.1), [1.0, 50.0, 100.0])
+    p = predict(3.0, 0.1, pgv_m_s=X, model=model).probability
+    for function in functions:
+        assert function.at(X) == pytest.approx(p, abs=SPREAD + 0.003)
+
+
+def test_blocks_that_share_nothing_are_counted_by_the_binomial_law() -> None:
+    law = {"rho_e": 0.0, "rho_s": 0.0, "rho_v": 1.0, "rho_o": 0.0, **LENGTHS, "l_y": 1e-9}
+    model = FragilityModel.from_row(model_row(dependence=law))
+    kr = 0.1 * (1.0 + 1e-6 * np.arange(20))
+    functions = of(model, np.full(20, 3.0), kr, [5.0, 25.0])
+    p = predict(3.0, 0.1, pgv_m_s=X, model=model).probability
+    assert functions[0].at(X) == pytest.approx(binom.sf(0, 20, p), abs=SPREAD + 0.003)
+    assert functions[1].at(X) == pytest.approx(binom.sf(4, 20, p), abs=SPREAD + 0.003)
+
+
+@pytest.mark.parametrize("shares", [[], [0.0], [10.0, 5.0], [101.0], [5.0, 5.0]])
+def test_shares_that_are_rejected(model: FragilityModel, shares: list[float]) -> None:
+    with pytest.raises(InputError, match="increasing percentages"):
+        of(model, [3.0], [0.1], shares)
+
+
+def test_without_the_dependence_nothing_is_known() -> None:
+    model = FragilityModel.from_row(model_row(dependence=None))
+    with pytest.raises(InputError, match="has no dependence model"):
+        of(model, [3.0, 4.0], [0.1, 0.1], [50.0])
+
+
+def test_a_share_of_less_than_one_block_is_said(model: FragilityModel) -> None:
+    warnings = share_functions(
+        "m", np.full(30, 3.0), np.full(30, 0.1), "pgv_m_s", [1.0], model=model
+    ).warnings
+    assert "1 % of 30 blocks is less than one" in warnings[-1]

@@ -15,11 +15,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rbfrag.errors import InputError
-from rbfrag.exchange.block_draws import read_draws
-from rbfrag.exchange.block_rows import BlockRows, read_blocks
+from rbfrag.exchange.block_rows import BlockRows, read_blocks, read_draws
 from rbfrag.exchange.table_answers import predict_table
 from rbfrag.exchange.tables.files import write_block_table
-from rbfrag.fragility.invalid_rows import describe_invalid, in_list
+from rbfrag.fragility.validation import describe_invalid, in_list
 from tests.block_tables import read_columns
 
 NAMES = ("block_id", "p2_1_s2", "kr", "mode", "weight", "lon", "lat")
@@ -104,29 +103,29 @@ def test_bad_rows_leave_the_others_as_they_are(
         with pytest.raises(InputError, match=r"(invalid block|blocks is valid).*\(block b0\)"):
             read_blocks(source)
         return
-    found = read_blocks(source)
-    assert found.rejected["row"].tolist() == bad
-    assert found.blocks["row"].tolist() == [i for i in range(len(rows)) if i not in bad]
-    for i, reason, place in zip(bad, found.rejected["reason"], found.row_labels, strict=True):
+    parsed = read_blocks(source)
+    assert parsed.rejected["row"].tolist() == bad
+    assert parsed.blocks["row"].tolist() == [i for i in range(len(rows)) if i not in bad]
+    for i, reason, place in zip(bad, parsed.rejected["reason"], parsed.row_labels, strict=True):
         expected = BAD[kinds[i]][1]
         if form == "geojson" and kinds[i] == "no place":  # a point has both, or none
             expected = "lon = nan, lat = nan is no place"
         assert reason.startswith(expected), (form, kinds[i])
         number = FIRST.get(form, 1) + i
         assert place == f"{WORDS.get(form, 'row')} {number} (block b{i})"
-    assert (found.blocks["kr"] == 0.1).all()
-    again = found.with_rejected({"block_id": found.blocks["block_id"], "p": found.blocks["kr"]})
+    assert (parsed.blocks["kr"] == 0.1).all()
+    again = parsed.with_rejected({"block_id": parsed.blocks["block_id"], "p": parsed.blocks["kr"]})
     assert again["block_id"].tolist() == [row[0] for row in rows]
     assert np.flatnonzero(np.isnan(again["p"]) | (again["p"] != 0.1)).tolist() == bad
-    said = found.describe_invalid()
-    assert len(said) == bool(bad)
+    text = parsed.describe_invalid()
+    assert len(text) == bool(bad)
     if bad:
-        assert said[0].startswith(
+        assert text[0].startswith(
             f"{len(bad)} of {len(rows)} blocks could not be used; the reasons"
         )
-        assert f"(block b{bad[0]}): " in said[0]
+        assert f"(block b{bad[0]}): " in text[0]
         with pytest.raises(InputError) as rejection:
-            found.require_all("all are asked about")
+            parsed.require_all("all are asked about")
         message = str(rejection.value)
         assert f"{len(bad)} of {len(rows)} blocks are invalid, and all are asked" in message
         assert len(message) < 500
@@ -137,11 +136,13 @@ def test_bad_rows_leave_the_others_as_they_are(
 def test_predictions_name_the_same_row(tmp_path: Path, form: str, kind: str) -> None:
     source = table(tmp_path, form, [SOUND, SOUND, BAD[kind][0], SOUND])
     target = tmp_path / f"out{source.suffix}"
-    told: Any = predict_table(source, target, inputs={"pgv_m_s": 0.6}, ignore_columns=("weight",))
+    document: Any = predict_table(
+        source, target, inputs={"pgv_m_s": 0.6}, ignore_columns=("weight",)
+    )
     place = f"{WORDS.get(form, 'row')} {FIRST.get(form, 1) + 2}"
-    (said,) = (text for text in told.warnings if "could not be used" in text)
-    assert said.startswith("1 of 4 blocks could not be used; the reasons stand in the column")
-    assert f"; it is {place}: " in said
+    (message,) = (text for text in document.warnings if "could not be used" in text)
+    assert message.startswith("1 of 4 blocks could not be used; the reasons stand in the column")
+    assert f"; it is {place}: " in message
     reasons = read_columns(target, ("probability",), texts=("reason",))
     assert np.isnan(reasons["probability"]).tolist() == [False, False, True, False]
     assert reasons["reason"][2]
@@ -160,11 +161,11 @@ def test_lines_are_those_of_an_editor(
         monkeypatch.setattr("rbfrag.exchange.tables.csv_file.pyarrow", _no_arrow)
     rows = read_blocks(source)
     assert rows.row_labels == ["line 6 (block b)", "line 8 (block d)"]
-    told: Any = predict_table(
+    document: Any = predict_table(
         source, tmp_path / "b.csv", inputs={"pgv_m_s": 0.6}, model=None, level=0.95, db=None
     )
-    assert (told.rows, told.without_answer) == (4, 2)
-    assert "the first is line 6: kr is not a number" in str(told.warnings)
+    assert (document.rows, document.without_answer) == (4, 2)
+    assert "the first is line 6: kr is not a number" in str(document.warnings)
 
 
 def _no_arrow() -> None:
@@ -180,10 +181,10 @@ def test_delimiters_behind_the_last_column_are_no_column(tmp_path: Path) -> None
     rows = read_blocks(source)
     assert rows.blocks["block_id"].tolist() == ["a", "b"]
     assert rows.rejected["reason"].tolist() == ["5 cells under 3 columns"]
-    told = predict_table(
+    document = predict_table(
         source, tmp_path / "b.csv", inputs={"pgv_m_s": 0.6}, model=None, level=0.95, db=None
     )
-    assert (told.rows, told.answered) == (3, 2)
+    assert (document.rows, document.answered) == (3, 2)
 
 
 def test_what_a_command_does_not_read_is_no_concern_of_it() -> None:
@@ -213,10 +214,10 @@ def test_kinds_of_rows() -> None:
         "kind": ["", "rocking", "sliding", "free-standing", "toppling"],
         "restitution": [np.nan, 1.2, 0.9, 0.9, 0.9],
     }  # fmt: skip
-    own: BlockRows = read_blocks(columns)
-    assert own.blocks["row"].tolist() == [0, 3, 4]
-    assert own.blocks["kind"].tolist() == ["toppling", "rocking", "toppling"]
-    rocking, sliding = own.rejected["reason"].tolist()
+    expected: BlockRows = read_blocks(columns)
+    assert expected.blocks["row"].tolist() == [0, 3, 4]
+    assert expected.blocks["kind"].tolist() == ["toppling", "rocking", "toppling"]
+    rocking, sliding = expected.rejected["reason"].tolist()
     assert rocking.startswith("restitution = 1.2 must be above 0 and up to 1")
     assert sliding == (
         "the block's mode is slide, and ky is missing: a block of kind sliding is given by ky and "
@@ -227,8 +228,8 @@ def test_kinds_of_rows() -> None:
         with pytest.raises(InputError, match=f"'{word}' is not a kind of failure"):
             read_blocks(wrong)
     columns["restitution"][1] = 0.9
-    one = read_blocks(columns, one_kind=True)
-    assert one.rejected["reason"][0] == (
+    single = read_blocks(columns, one_kind=True)
+    assert single.rejected["reason"][0] == (
         "the block's kind is rocking, and the answer is for kind toppling"
     )
     with pytest.raises(InputError, match="unknown kind 'rolling'"):
@@ -289,10 +290,10 @@ def test_what_is_wrong_with_all_rows_names_the_file(tmp_path: Path, read: Any) -
 
 
 def test_a_long_list_has_room_in_a_message() -> None:
-    places = [f"line {i} (block {'n' * 60}{i})" for i in range(5000)]
+    positions = [f"line {i} (block {'n' * 60}{i})" for i in range(5000)]
     reasons = [f"kr = {i} is not a number" if i % 2 else "p2 is empty" for i in range(5000)]
-    text = in_list(places, reasons)
-    assert text.startswith(f"{places[0]}, {places[2]}")
+    text = in_list(positions, reasons)
+    assert text.startswith(f"{positions[0]}, {positions[2]}")
     assert "and 2,494 more: p2 is empty" in text
     assert text.endswith("; and 2,500 more")
     with pytest.raises(InputError) as rejection:

@@ -39,13 +39,13 @@ def test_numbers_come_back_to_the_bit(
     path = tmp_path_factory.mktemp("table") / f"a{kind}"
     column = np.array(values)
     write_block_table({"kr": column, "other": np.zeros(column.size)}, path)
-    found = read_columns(path, ("kr",))["kr"]
+    parsed = read_columns(path, ("kr",))["kr"]
     if kind == ".xlsx":  # 16 digits, and Excel knows no -0
-        assert np.allclose(found, column, rtol=1e-15, atol=0.0, equal_nan=True)
+        assert np.allclose(parsed, column, rtol=1e-15, atol=0.0, equal_nan=True)
         return
-    assert np.array_equal(found, column, equal_nan=True)
+    assert np.array_equal(parsed, column, equal_nan=True)
     fine = ~np.isnan(column)
-    assert np.array_equal(np.signbit(found[fine]), np.signbit(column[fine]))
+    assert np.array_equal(np.signbit(parsed[fine]), np.signbit(column[fine]))
 
 
 def test_cells_of_a_csv(tmp_path: Path) -> None:
@@ -142,7 +142,7 @@ for act in (lambda: table_path("a.parquet"), lambda: read_columns("a.parquet", (
     except MissingExtraError as error:
         print(error)
 """
-    done = subprocess.run(
+    process = subprocess.run(
         [sys.executable, "-c", program],
         capture_output=True,
         text=True,
@@ -150,7 +150,7 @@ for act in (lambda: table_path("a.parquet"), lambda: read_columns("a.parquet", (
         cwd=tmp_path,
         env={**os.environ, "PYTHONPATH": str(Path(__file__).resolve().parent.parent.parent)},
     )
-    assert done.stdout.count("pip install 'rbfrag[parquet]'") == 2, done.stderr
+    assert process.stdout.count("pip install 'rbfrag[parquet]'") == 2, process.stderr
 
 
 def test_rectangles_of_a_free_standing_kind(tmp_path: Path) -> None:
@@ -161,11 +161,11 @@ def test_rectangles_of_a_free_standing_kind(tmp_path: Path) -> None:
         "3,0.6,-5,,\n3,0.6,-5,rocking,\n3,0.6,-5,rocking,0.9\n"
     )
     columns = read_blocks(path).require_all()
-    backed, free, _ = columns["kr"].tolist()
+    backed, free_standing, _ = columns["kr"].tolist()
     alpha, dip = np.arctan(0.2), np.radians(5.0)
-    assert (backed, free) == pytest.approx((np.tan(alpha + dip), np.tan(alpha - dip)))
+    assert (backed, free_standing) == pytest.approx((np.tan(alpha + dip), np.tan(alpha - dip)))
     assert columns["restitution"][1:] == pytest.approx([1.0 - 1.5 * np.sin(alpha) ** 2, 0.9])
-    assert read_blocks(path, "rocking").require_all()["kr"][0] == pytest.approx(free)
+    assert read_blocks(path, "rocking").require_all()["kr"][0] == pytest.approx(free_standing)
 
 
 def test_text_of_another_encoding_is_rejected_with_its_row(tmp_path: Path) -> None:

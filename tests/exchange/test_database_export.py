@@ -53,18 +53,18 @@ def _values(cells: pd.Series, like: pd.Series) -> list[object]:
 
 
 def test_data_frames(database: Path) -> None:
-    found = rbfrag.read_table("combination", db=database)
-    assert len(found) == 8
-    assert found["vertical_motion_id"].dtype == pd.Int64Dtype()
-    assert found["vertical_motion_id"].isna().all()
-    assert found["kr"].isna().sum() == 1
+    result = rbfrag.read_table("combination", db=database)
+    assert len(result) == 8
+    assert result["vertical_motion_id"].dtype == pd.Int64Dtype()
+    assert result["vertical_motion_id"].isna().all()
+    assert result["kr"].isna().sum() == 1
     motions = rbfrag.read_table("motion", db=database, arrays=True)
     np.testing.assert_allclose(motions["samples"][0], shaking(0), atol=1e-7)
-    joined = found.merge(motions, left_on="motion_id", right_on="id", suffixes=("", "_motion"))
+    joined = result.merge(motions, left_on="motion_id", right_on="id", suffixes=("", "_motion"))
     ratio = joined["kr"] / joined["pga_g"]
     np.testing.assert_allclose(ratio, joined["kr_over_pga"], rtol=1e-14)
-    some = rbfrag.read_table("motion", db=database, columns=["dt_s", "id"])
-    assert list(some.columns) == ["dt_s", "id"]
+    subset = rbfrag.read_table("motion", db=database, columns=["dt_s", "id"])
+    assert list(subset.columns) == ["dt_s", "id"]
 
 
 @pytest.mark.parametrize("form", ["parquet", "csv"])

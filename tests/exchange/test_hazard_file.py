@@ -44,8 +44,8 @@ def test_usgs_nshm(formats_dir: Path) -> None:
     assert pga.levels[0] == pytest.approx(0.0025, rel=1e-12)
     assert pga.annual_rate[0] == 0.7542958319493401
     for imt in ("SA(1.0)", "SA(1)", "sa( 1.00 )"):
-        (one,) = read_hazard_curves(path, imt=imt)
-        assert (one.period_s, one.known_as) == (1.0, "sa10_g")
+        (single,) = read_hazard_curves(path, imt=imt)
+        assert (single.period_s, single.known_as) == (1.0, "sa10_g")
     with pytest.raises(InputError, match="no curve of PGV; there are PGA, SA"):
         read_hazard_curves(path, imt="PGV")
     (best,) = suited_curves(curves)
@@ -56,7 +56,7 @@ def test_usgs_nshm(formats_dir: Path) -> None:
     with pytest.raises(
         InputError, match=r"SA\(0.1\), SA\(0.5\); wanted is one of PGV, SA\(1\), PGA"
     ):
-        suited_curves([each for each in curves if each.imt in ("SA(0.1)", "SA(0.5)")])
+        suited_curves([curve for curve in curves if curve.imt in ("SA(0.1)", "SA(0.5)")])
     with pytest.raises(InputError, match=r"wanted is one of SA\(0.25\)"):
         suited_curves(curves[:2], converted_period_s=0.25)
 
@@ -156,18 +156,18 @@ def test_no_such_file_and_no_text(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("columns", "what"),
+    ("columns", "subject"),
     [
         ("PGA-0.1,SA(1.0)-0.02", "a hazard map"),
         ("0.100000~PGA,0.100000~SA(1.0)", "uniform hazard spectra"),
     ],
 )
-def test_maps_and_spectra_are_no_curves(tmp_path: Path, columns: str, what: str) -> None:
+def test_maps_and_spectra_are_no_curves(tmp_path: Path, columns: str, subject: str) -> None:
     """The names of columns are those of the engine's `hmap_dt` and `uhs_dt`."""
     path = tmp_path / "hazard_map-mean_7.csv"
     head = "#,,,\"generated_by='OpenQuake engine 3.26.2', kind='mean', investigation_time=50.0\""
     path.write_text(f"{head}\nlon,lat,{columns}\n174.0,-41.0,0.1,0.2\n")
-    with pytest.raises(InputError, match=f"is a column of {what}.*oq export hcurves"):
+    with pytest.raises(InputError, match=f"is a column of {subject}.*oq export hcurves"):
         read_hazard_curves(path)
 
 

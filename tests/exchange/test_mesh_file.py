@@ -79,16 +79,16 @@ def test_a_tilted_box_rests_on_an_edge_and_a_raised_one(tmp_path: Path) -> None:
     x, height = 0.5 * (W * c - H * s), 0.5 * (W * s + H * c)
     forward, backward = W * c - x, x
     inertia = (W * W + H * H) / 12.0
-    kept = inertia + height**2 - forward * backward
+    retained = inertia + height**2 - forward * backward
     rocking = block.hull.rocking(np.zeros(1))
     assert block.hull.height_m == pytest.approx(height, **EXACT)
     assert rocking.kr_forward[0] == pytest.approx(forward / height, **EXACT)
     assert rocking.kr_backward[0] == pytest.approx(backward / height, **EXACT)
-    for found, arm in ((rocking.p2_forward, forward), (rocking.p2_backward, backward)):
+    for result, arm in ((rocking.p2_forward, forward), (rocking.p2_backward, backward)):
         r2 = arm * arm + height * height
-        assert found[0] == pytest.approx(G * math.sqrt(r2) / (inertia + r2), **EXACT)
-    e31 = kept / (inertia + backward**2 + height**2)
-    e13 = kept / (inertia + forward**2 + height**2)
+        assert result[0] == pytest.approx(G * math.sqrt(r2) / (inertia + r2), **EXACT)
+    e31 = retained / (inertia + backward**2 + height**2)
+    e13 = retained / (inertia + forward**2 + height**2)
     assert rocking.restitution_forward[0] == pytest.approx(e31, **EXACT)
     assert rocking.restitution_backward[0] == pytest.approx(e13, **EXACT)
     assert rocking.restitution[0] == pytest.approx(math.sqrt(e31 * e13), **EXACT)
@@ -125,8 +125,8 @@ def test_asymmetric_prisms(
     rocking = rbfrag.block_from_mesh(path).hull.rocking(np.zeros(1))
     assert (rocking.kr_forward[0], rocking.kr_backward[0]) == pytest.approx((t3, -t1), **EXACT)
     assert (rocking.p2_forward[0], rocking.p2_backward[0]) == pytest.approx(p2, abs=5.1e-7)
-    found = rocking.restitution_forward[0], rocking.restitution_backward[0]
-    assert found == pytest.approx(restitution, abs=5.1e-8)
+    result = rocking.restitution_forward[0], rocking.restitution_backward[0]
+    assert result == pytest.approx(restitution, abs=5.1e-8)
 
 
 def test_a_refined_ellipsoid_cut_flat_converges(tmp_path: Path) -> None:
@@ -134,8 +134,8 @@ def test_a_refined_ellipsoid_cut_flat_converges(tmp_path: Path) -> None:
     t = np.polynomial.Polynomial([0.0, 1.0])
 
     def over_slices(value: np.polynomial.Polynomial) -> float:
-        whole = value.integ()
-        return math.pi * float(whole(1.0) - whole(-cut))
+        complete = value.integ()
+        return math.pi * float(complete(1.0) - complete(-cut))
 
     area = 1.0 - t * t
     unit_volume = over_slices(area)
@@ -170,7 +170,7 @@ def test_a_refined_ellipsoid_cut_flat_converges(tmp_path: Path) -> None:
     assert np.all(np.array(errors)[-1] < 1e-3)
 
 
-def kept(surface: Surface, *dropped: int) -> Surface:
+def without_triangles(surface: Surface, *dropped: int) -> Surface:
     vertices, faces = surface
     return vertices, np.delete(faces, dropped, axis=0)
 
@@ -180,11 +180,13 @@ EGG = cut_ellipsoid((0.35, 0.45, 0.6), 0.8, 6)
 
 
 def test_small_holes_are_closed_and_said(tmp_path: Path) -> None:
-    whole = rbfrag.block_from_mesh(write_obj(tmp_path / "a.obj", BOX))
+    complete = rbfrag.block_from_mesh(write_obj(tmp_path / "a.obj", BOX))
     for dropped, triangles in (((3,), 1), ((0, 1), 2)):  # a triangle; a side of two
-        block = rbfrag.block_from_mesh(write_obj(tmp_path / "b.obj", kept(BOX, *dropped)))
-        assert block.volume_m3 == pytest.approx(whole.volume_m3, rel=1e-12)
-        np.testing.assert_allclose(block.rocking(), whole.rocking(), rtol=1e-12)
+        block = rbfrag.block_from_mesh(
+            write_obj(tmp_path / "b.obj", without_triangles(BOX, *dropped))
+        )
+        assert block.volume_m3 == pytest.approx(complete.volume_m3, rel=1e-12)
+        np.testing.assert_allclose(block.rocking(), complete.rocking(), rtol=1e-12)
         (text,) = block.warnings
         assert f"closed with {triangles} triangles" in text
 
@@ -198,23 +200,23 @@ def test_large_holes_are_rejected(tmp_path: Path) -> None:
 
 def test_flipped_faces_are_turned_and_said(tmp_path: Path) -> None:
     vertices, faces = EGG
-    whole = rbfrag.block_from_mesh(write_obj(tmp_path / "a.obj", EGG))
-    some = faces.copy()
-    some[[3, 40, 77]] = some[[3, 40, 77], ::-1]
-    for flipped, count in ((some, 3), (faces[:, ::-1], len(faces))):
+    complete = rbfrag.block_from_mesh(write_obj(tmp_path / "a.obj", EGG))
+    subset = faces.copy()
+    subset[[3, 40, 77]] = subset[[3, 40, 77], ::-1]
+    for flipped, count in ((subset, 3), (faces[:, ::-1], len(faces))):
         block = rbfrag.block_from_mesh(write_obj(tmp_path / "b.obj", (vertices, flipped)))
-        assert block.volume_m3 == pytest.approx(whole.volume_m3, rel=1e-12)
-        np.testing.assert_allclose(block.rocking(), whole.rocking(), rtol=1e-12)
+        assert block.volume_m3 == pytest.approx(complete.volume_m3, rel=1e-12)
+        np.testing.assert_allclose(block.rocking(), complete.rocking(), rtol=1e-12)
         assert any(f"{count} of {len(faces)} faces pointed inwards" in w for w in block.warnings)
 
 
 def test_faces_there_twice_or_without_area_and_loose_vertices(tmp_path: Path) -> None:
     vertices, faces = BOX
-    whole = rbfrag.block_from_mesh(write_obj(tmp_path / "a.obj", BOX))
+    complete = rbfrag.block_from_mesh(write_obj(tmp_path / "a.obj", BOX))
     vertices = np.vstack([vertices, (0.0, 0.0, -1.0)])  # no face has it: no contact
     faces = np.vstack([faces, faces[2, [1, 2, 0]], (0, 0, 1)])
     block = rbfrag.block_from_mesh(write_obj(tmp_path / "b.obj", (vertices, faces)))
-    np.testing.assert_allclose(block.rocking(), whole.rocking(), rtol=1e-12)
+    np.testing.assert_allclose(block.rocking(), complete.rocking(), rtol=1e-12)
     assert block.warnings == ("1 faces were there twice and count once",)
 
 
@@ -234,9 +236,9 @@ def test_two_bodies_and_a_surface_without_inside_are_rejected(tmp_path: Path) ->
     grid = [(i, j) for i in range(m) for j in range(n)]
     klein = [(at(i, j), at(i + 1, j), at(i + 1, j + 1)) for i, j in grid]
     klein += [(at(i, j), at(i + 1, j + 1), at(i, j + 1)) for i, j in grid]
-    places = np.random.default_rng(1).uniform(size=(m * n, 3))
+    positions = np.random.default_rng(1).uniform(size=(m * n, 3))
     with pytest.raises(InputError, match="no inside and outside"):
-        rbfrag.block_from_mesh(write_obj(tmp_path / "c.obj", (places, np.array(klein))))
+        rbfrag.block_from_mesh(write_obj(tmp_path / "c.obj", (positions, np.array(klein))))
     flat = box(1000.0, 1e-7, 1000.0)
     with pytest.raises(InputError, match="encloses no volume"):
         rbfrag.block_from_mesh(write_obj(tmp_path / "d.obj", flat))
@@ -341,20 +343,20 @@ def test_a_missing_file_and_a_folder(tmp_path: Path) -> None:
         rbfrag.block_from_mesh(tmp_path / "b.obj")
 
 
-WHOLE = {
+COMPLETE = {
     suffix: content.encode() if isinstance(content, str) else content
     for suffix in ("stl", "ply", "obj")
     for content in [trimesh.Trimesh(*BOX, process=False).export(file_type=suffix)]
 }
 
 
-@pytest.mark.parametrize("suffix", list(WHOLE))
+@pytest.mark.parametrize("suffix", list(COMPLETE))
 @settings(max_examples=60, suppress_health_check=[HealthCheck.too_slow])
 @given(data=st.data())
 def test_damaged_files_are_rejected_or_answered(
     suffix: str, data: st.DataObject, tmp_path_factory: pytest.TempPathFactory
 ) -> None:
-    content = bytearray(WHOLE[suffix])
+    content = bytearray(COMPLETE[suffix])
     for _ in range(data.draw(st.integers(1, 4))):
         content[data.draw(st.integers(0, len(content) - 1))] = data.draw(st.integers(0, 255))
     if data.draw(st.booleans()):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rbfrag.cli.parameters import options
+from rbfrag.cli import options
 from rbfrag.errors import InputError
 from rbfrag.exchange.nearest_site import WITHIN_KM, join_sites
 

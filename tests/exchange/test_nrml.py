@@ -13,20 +13,20 @@ from hypothesis import strategies as st
 from rbfrag.errors import InputError
 from rbfrag.exchange.fragility_function import discrete_function, lognormal_function
 from rbfrag.exchange.nrml import nrml_text, read_nrml
-from rbfrag.hazards.measure_type import IntensityType
+from rbfrag.hazards.curve import IntensityType
 
 PGV = IntensityType("pgv_m_s", 0.01)
 PGA = IntensityType("pga_g", 1.0)
 
 
 def test_version_04_continuous(formats_dir: Path) -> None:
-    found = read_nrml(formats_dir / "nrml04_fragility_continuous.xml")
-    assert [(f.name, f.limit_state) for f in found] == [
+    parsed = read_nrml(formats_dir / "nrml04_fragility_continuous.xml")
+    assert [(f.name, f.limit_state) for f in parsed] == [
         ("RC", "LS1"), ("RC", "LS2"), ("RM", "LS1"), ("RM", "LS2")
     ]  # fmt: skip
     # mean 0.2 and stddev 0.05 are those of the variable: β² = ln(1 + 1/16)
-    assert found[0].beta == pytest.approx(math.sqrt(math.log(1.0625)), rel=1e-12)
-    assert found[0].median == pytest.approx(0.2 / math.sqrt(1.0625), rel=1e-12)
+    assert parsed[0].beta == pytest.approx(math.sqrt(math.log(1.0625)), rel=1e-12)
+    assert parsed[0].median == pytest.approx(0.2 / math.sqrt(1.0625), rel=1e-12)
 
 
 def test_version_04_discrete(formats_dir: Path) -> None:
@@ -36,10 +36,10 @@ def test_version_04_discrete(formats_dir: Path) -> None:
 
 
 def test_version_05(formats_dir: Path) -> None:
-    found = read_nrml(formats_dir / "nrml05_fragility_continuous_and_discrete.xml")
-    assert len(found) == 8
-    assert [f.is_lognormal for f in found] == [True] * 4 + [False] * 4
-    discrete = found[4]
+    parsed = read_nrml(formats_dir / "nrml05_fragility_continuous_and_discrete.xml")
+    assert len(parsed) == 8
+    assert [f.is_lognormal for f in parsed] == [True] * 4 + [False] * 4
+    discrete = parsed[4]
     assert discrete.kind == IntensityType("sa_g", 1.0, 0.3)
     assert discrete.at([0.04, 0.05, 15.0]).tolist() == [0.0, 2.50257e-05, 1.0]
 
@@ -53,11 +53,11 @@ def test_lognormal_there_and_back(
     tmp_path_factory: pytest.TempPathFactory, median: float, beta: float, kind: IntensityType
 ) -> None:
     path = tmp_path_factory.getbasetemp() / "there.xml"
-    one = lognormal_function("a", "toppled", kind, median, beta, "test")
-    path.write_text(nrml_text([one]))
+    single = lognormal_function("a", "toppled", kind, median, beta, "test")
+    path.write_text(nrml_text([single]))
     (back,) = read_nrml(path)
     x = median * np.exp(beta * np.linspace(-5.0, 5.0, 41))
-    assert np.abs(back.at(x) - one.at(x)).max() < 1e-9
+    assert np.abs(back.at(x) - single.at(x)).max() < 1e-9
 
 
 @given(st.lists(st.tuples(st.floats(1e-3, 1.0), st.floats(0.0, 1.0)), min_size=2, max_size=30))
@@ -67,14 +67,14 @@ def test_discrete_there_and_back(
     path = tmp_path_factory.getbasetemp() / "back.xml"
     levels = np.cumsum([step for step, _ in steps])
     p = np.sort([value for _, value in steps])
-    one = discrete_function("a & <b>", "toppled", PGV, levels, p, "test", 0.5 * levels[0])
-    path.write_text(nrml_text([one]))
+    single = discrete_function("a & <b>", "toppled", PGV, levels, p, "test", 0.5 * levels[0])
+    path.write_text(nrml_text([single]))
     (back,) = read_nrml(path)
     assert back.name == "a & <b>"
     x = np.linspace(0.0, 1.2 * levels[-1], 101)
     assert back.at(levels) == pytest.approx(p, abs=1e-9)
     apart = np.abs(x[:, None] - np.append(levels, 0.5 * levels[0])).min(axis=1) > 1e-9
-    assert np.abs(back.at(x) - one.at(x))[apart].max() < 1e-6
+    assert np.abs(back.at(x) - single.at(x))[apart].max() < 1e-6
 
 
 def test_velocity_is_written_in_cm_s(tmp_path: Path) -> None:
@@ -84,17 +84,17 @@ def test_velocity_is_written_in_cm_s(tmp_path: Path) -> None:
 
 
 def test_what_cannot_be_written() -> None:
-    one = lognormal_function("a", "toppled", PGV, 0.5, 0.3, "test")
+    single = lognormal_function("a", "toppled", PGV, 0.5, 0.3, "test")
     other = lognormal_function("b", "moved", PGV, 0.5, 0.3, "test")
     with pytest.raises(InputError, match="no fragility function"):
         nrml_text([])
     with pytest.raises(InputError, match="'a' occurs twice"):
-        nrml_text([one, other, one])
+        nrml_text([single, other, single])
     with pytest.raises(InputError, match="'b' has other limit states"):
-        nrml_text([one, other])
+        nrml_text([single, other])
 
 
-WHOLE = """<?xml version="1.0"?>
+COMPLETE = """<?xml version="1.0"?>
 <nrml xmlns="http://openquake.org/xmlns/nrml/0.5">
 <fragilityModel id="m" assetCategory="x" lossCategory="y"><limitStates>low high</limitStates>
 <fragilityFunction id="A" format="discrete"><imls imt="PGV">10 20</imls>
@@ -125,9 +125,9 @@ WHOLE = """<?xml version="1.0"?>
     ],
 )  # fmt: skip
 def test_bad_files_are_rejected(tmp_path: Path, old: str, new: str, words: str) -> None:
-    assert old in WHOLE
+    assert old in COMPLETE
     path = tmp_path / "a.xml"
-    path.write_text(WHOLE.replace(old, new))
+    path.write_text(COMPLETE.replace(old, new))
     with pytest.raises(InputError, match=words):
         read_nrml(path)
 

@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 
 from rbfrag.errors import InputError
-from rbfrag.exchange.openquake.events import JobFiles, read_events
+from rbfrag.exchange.openquake_events import job_files, read_events
 from rbfrag.hazards.event_set import EventSet
 from tests.exchange.openquake_job import EVENTS, SHAKING, write_csv, write_job
 
 
 def read(folder: Path, **about: object) -> EventSet:
     """Read the files of a folder."""
-    return read_events(JobFiles.of(folder), **about)  # type: ignore[arg-type]
+    return read_events(job_files(folder), **about)  # type: ignore[arg-type]
 
 
 def replace_text(folder: Path, name: str, old: str, new: str) -> None:
@@ -72,9 +72,11 @@ def test_a_scenario_has_no_rate(tmp_path: Path) -> None:
 def test_older_columns(tmp_path: Path, names: tuple[str, ...], mesh: tuple[str, ...]) -> None:
     folder = write_job(tmp_path)
     ids = {"custom_site_id": ("0012", "007", "Z9"), "site_id": ("0", "1", "2")}.get(mesh[0])
-    places = [(174.0 + i, -41.0) for i in range(3)]
+    positions = [(174.0 + i, -41.0) for i in range(3)]
     rows = (
-        places if ids is None else [(one, *place) for one, place in zip(ids, places, strict=True)]
+        positions
+        if ids is None
+        else [(item, *place) for item, place in zip(ids, positions, strict=True)]
     )
     write_csv(folder / "sitemesh_5.csv", mesh, rows)
     number = {"0012": 0, "007": 1, "Z9": 2}
@@ -172,21 +174,23 @@ def test_files_of_a_folder_and_by_name(tmp_path: Path) -> None:
     shutil.copy(folder / "events_5.csv", folder / "events_6.csv")
     with pytest.raises(InputError, match=r"and events_6\.csv.*give the file of events"):
         read(folder)
-    named = JobFiles.of(folder, {"events": folder / "events_6.csv"})
+    named = job_files(folder, {"events": folder / "events_6.csv"})
     assert read_events(named).event_id.size == len(EVENTS)
     (folder / "events_6.csv").unlink()
     (folder / "gmf-data_5.csv").rename(tmp_path / "shaking.csv")
     with pytest.raises(InputError, match="no file of gmf-data"):
-        JobFiles.of(folder)
+        job_files(folder)
     with pytest.raises(InputError, match="is not a folder"):
-        JobFiles.of(tmp_path / "nowhere")
+        job_files(tmp_path / "nowhere")
+    with pytest.raises(InputError, match="files: 'gmf' is not one of gmf_data, events"):
+        job_files(folder, {"gmf": tmp_path / "shaking.csv"})
 
 
 def test_many_parts_are_one_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    whole = read(write_job(tmp_path))
-    monkeypatch.setattr("rbfrag.exchange.openquake.table.ROWS", 2)
+    complete = read(write_job(tmp_path))
+    monkeypatch.setattr("rbfrag.exchange.openquake_tables.ROWS", 2)
     parts = read(tmp_path)
-    assert parts.measures["pgv_m_s"].tolist() == whole.measures["pgv_m_s"].tolist()
+    assert parts.measures["pgv_m_s"].tolist() == complete.measures["pgv_m_s"].tolist()
     replace_text(tmp_path, "gmf-data", "4,90.0,0012", "4,90.0,12")
     with pytest.raises(InputError, match="line 7: the site '12'"):
         read(tmp_path)
@@ -205,7 +209,7 @@ def test_many_parts_are_one_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 def test_exports_of_the_engine(
     formats_dir: Path, folder: str, events: int, rows: int, effective: float | None
 ) -> None:
-    found = read(formats_dir / folder)
-    assert (found.event_id.size, found.event.size) == (events, rows)
-    assert found.effective_years == (None if effective is None else pytest.approx(effective))
-    assert not found.warnings
+    result = read(formats_dir / folder)
+    assert (result.event_id.size, result.event.size) == (events, rows)
+    assert result.effective_years == (None if effective is None else pytest.approx(effective))
+    assert not result.warnings

@@ -11,20 +11,16 @@ import pytest
 
 from rbfrag.errors import InputError
 from rbfrag.exchange.fragility_function import discrete_function, lognormal_function, renamed
-from rbfrag.exchange.pelicun_table import (
-    metadata_text,
-    pelicun_text,
-    read_pelicun,
-)
-from rbfrag.hazards.measure_type import IntensityType
+from rbfrag.exchange.pelicun_table import metadata_text, pelicun_text, read_pelicun
+from rbfrag.hazards.curve import IntensityType
 
 PGV = IntensityType("pgv_m_s", 0.01)
 
 
 def test_hazus_buildings(formats_dir: Path) -> None:
-    found = read_pelicun(formats_dir / "simcenter_hazus_v6.1_building_fragility.csv")
-    one = next(f for f in found if f.name == "LF.W1.HC" and f.limit_state == "LS1")
-    assert (one.median, one.beta, one.kind.measure) == (0.26, 0.4, "pga_g")
+    parsed = read_pelicun(formats_dir / "simcenter_hazus_v6.1_building_fragility.csv")
+    single = next(f for f in parsed if f.name == "LF.W1.HC" and f.limit_state == "LS1")
+    assert (single.median, single.beta, single.kind.measure) == (0.26, 0.4, "pga_g")
 
 
 def test_other_demands_are_passed_over(formats_dir: Path) -> None:
@@ -52,11 +48,11 @@ def test_there_and_back(tmp_path: Path) -> None:
 
 
 def test_what_cannot_be_written() -> None:
-    one = lognormal_function("a", "toppled", PGV, 0.5, 0.3, "test")
+    single = lognormal_function("a", "toppled", PGV, 0.5, 0.3, "test")
     with pytest.raises(InputError, match="no fragility function"):
         pelicun_text([])
     with pytest.raises(InputError, match="'a' occurs twice"):
-        pelicun_text([one, one])
+        pelicun_text([single, single])
 
 
 def test_ids_have_no_dashes() -> None:

@@ -42,45 +42,45 @@ def grid_file(tmp_path: Path) -> Path:
 
 
 def test_version_3(formats_dir: Path) -> None:
-    found = read_shakemap(formats_dir / "shakemap_v3_loma_prieta_grid.xml")
-    assert (found.columns, found.rows, found.is_whole) == (241, 193, True)
-    assert (found.event.magnitude, found.event.depth_km, found.event.lat) == (6.9, 18.0, 37.04)
+    parsed = read_shakemap(formats_dir / "shakemap_v3_loma_prieta_grid.xml")
+    assert (parsed.columns, parsed.rows, parsed.is_whole) == (241, 193, True)
+    assert (parsed.event["magnitude"], parsed.epicentre) == (6.9, (-121.88, 37.04))
     # first row of the file: -125.3800 39.4340 0.52 1.57, percent of g and cm/s
-    assert (found.lon[0], found.lat[0]) == (-125.38, 39.434)
-    assert found.measures["pga_g"][0] == pytest.approx(0.0052)
-    assert found.measures["pgv_m_s"][0] == pytest.approx(0.0157)
-    assert found.std_ln["pga_g"][0] == 0.49
-    assert list(found.std_ln) == ["pga_g"]
+    assert (parsed.lon[0], parsed.lat[0]) == (-125.38, 39.434)
+    assert parsed.measures["pga_g"][0] == pytest.approx(0.0052)
+    assert parsed.measures["pgv_m_s"][0] == pytest.approx(0.0157)
+    assert parsed.std_ln["pga_g"][0] == 0.49
+    assert list(parsed.std_ln) == ["pga_g"]
     # PSA03 1.63, PSA10 2.7, PSA30 0.7 percent of g
-    sa = [found.measures[name][0] for name in ("sa03_g", "sa10_g", "sa30_g")]
+    sa = [parsed.measures[name][0] for name in ("sa03_g", "sa10_g", "sa30_g")]
     assert sa == pytest.approx([0.0163, 0.027, 0.007])
-    assert found.warnings == ()
+    assert parsed.warnings == ()
 
 
 def test_blank_units_are_those_of_the_manual(formats_dir: Path) -> None:
-    found = read_shakemap(formats_dir / "shakemap_v3_loma_prieta_grid_cut_blank_units.xml")
-    assert found.measures["pga_g"][0] == pytest.approx(0.18)
-    assert found.measures["pgv_m_s"][0] == pytest.approx(0.1323)
-    assert sum("has no unit" in text for text in found.warnings) == 6
+    parsed = read_shakemap(formats_dir / "shakemap_v3_loma_prieta_grid_cut_blank_units.xml")
+    assert parsed.measures["pga_g"][0] == pytest.approx(0.18)
+    assert parsed.measures["pgv_m_s"][0] == pytest.approx(0.1323)
+    assert sum("has no unit" in text for text in parsed.warnings) == 6
 
 
 def test_version_4_has_another_order_and_lies_about_its_size(formats_dir: Path) -> None:
     path = formats_dir / "shakemap_v4_grid_cropped.xml"
     with pytest.raises(InputError, match=r"10 nodes, .* 741 x 575 = 426075: with allow_partial"):
         read_shakemap(path)
-    found = read_shakemap(path, allow_partial=True)
-    assert found.measures["pga_g"][0] == pytest.approx(0.006399)
-    assert found.measures["pgv_m_s"][0] == pytest.approx(0.01023)
-    assert not found.is_whole
-    assert "read as it is" in found.warnings[0]
+    parsed = read_shakemap(path, allow_partial=True)
+    assert parsed.measures["pga_g"][0] == pytest.approx(0.006399)
+    assert parsed.measures["pgv_m_s"][0] == pytest.approx(0.01023)
+    assert not parsed.is_whole
+    assert "read as it is" in parsed.warnings[0]
 
 
 def test_uncertainty_of_the_same_map(tmp_path: Path, grid_file: Path) -> None:
     other = tmp_path / "uncertainty.xml"
     other.write_text(UNCERTAINTY)
-    found = read_shakemap(grid_file, uncertainty=other)
-    assert found.std_ln["pgv_m_s"].tolist() == [0.5, 0.6, 0.7, 0.5, 0.6, 0.7]
-    assert found.std_ln["pga_g"].tolist() == [0.4, 0.5, 0.6, 0.4, 0.5, 0.6]
+    parsed = read_shakemap(grid_file, uncertainty=other)
+    assert parsed.std_ln["pgv_m_s"].tolist() == [0.5, 0.6, 0.7, 0.5, 0.6, 0.7]
+    assert parsed.std_ln["pga_g"].tolist() == [0.4, 0.5, 0.6, 0.4, 0.5, 0.6]
     other.write_text(UNCERTAINTY.replace("e1", "e2"))
     with pytest.raises(InputError, match="of event 'e2', the grid of 'e1'"):
         read_shakemap(grid_file, uncertainty=other)
@@ -135,9 +135,9 @@ def test_numbers_cut_by_the_parser_are_put_together(tmp_path: Path) -> None:
     head = start.replace('nlon="3" nlat="2"', f'nlon="{n}" nlat="1"')
     path = tmp_path / "grid.xml"
     path.write_text(f"{head}<grid_data>\n{rows}\n</grid_data>{rest.split('</grid_data>')[1]}")
-    found = read_shakemap(path)
-    assert found.lon.size == n
-    assert found.measures["pgv_m_s"].tolist() == [0.01 * (10 + i % 7) for i in range(n)]
+    parsed = read_shakemap(path)
+    assert parsed.lon.size == n
+    assert parsed.measures["pgv_m_s"].tolist() == [0.01 * (10 + i % 7) for i in range(n)]
 
 
 def test_suspicious_units_are_doubted(grid_file: Path) -> None:
@@ -147,9 +147,9 @@ def test_suspicious_units_are_doubted(grid_file: Path) -> None:
 
 def test_a_grid_without_pgv(grid_file: Path) -> None:
     grid_file.write_text(GRID.replace('name="PGV" units="cm/s"', 'name="PSA10" units="pctg"'))
-    found = read_shakemap(grid_file)
-    assert list(found.measures) == ["pga_g", "sa10_g"]
-    assert found.measures["sa10_g"].tolist() == pytest.approx([0.1, 0.2, 0.4, 0.1, 0.2, 0.4])
+    parsed = read_shakemap(grid_file)
+    assert list(parsed.measures) == ["pga_g", "sa10_g"]
+    assert parsed.measures["sa10_g"].tolist() == pytest.approx([0.1, 0.2, 0.4, 0.1, 0.2, 0.4])
     nothing = GRID.replace('"PGV"', '"MMI"').replace('"PGA"', '"SVEL"')
     grid_file.write_text(nothing)
     with pytest.raises(InputError, match="no field PGV or PGA or PSA03 or PSA10 or PSA30"):
@@ -162,8 +162,8 @@ def test_deviations_of_spectral_accelerations(tmp_path: Path, grid_file: Path) -
         other.write_text(
             UNCERTAINTY.replace('"STDPGV" units="ln(cm/s)"', f'"STDPSA10" units="{unit}"')
         )
-        found = read_shakemap(grid_file, uncertainty=other)
-        assert found.std_ln["sa10_g"].tolist() == [0.5, 0.6, 0.7, 0.5, 0.6, 0.7]
+        parsed = read_shakemap(grid_file, uncertainty=other)
+        assert parsed.std_ln["sa10_g"].tolist() == [0.5, 0.6, 0.7, 0.5, 0.6, 0.7]
 
 
 @pytest.mark.parametrize("name", ["shake_result.hdf", "SHAKE.HDF5"])

@@ -46,8 +46,10 @@ def answer(
     with opened_database(str(database), create=True) as engine, engine.begin() as connection:
         save_model(connection, model_row())
 
-    def run(source: Path, target: Path, **given: float) -> TableAnswer:
-        return predict_table(source, target, inputs=given, model=None, level=0.95, db=str(database))
+    def run(source: Path, target: Path, **inputs: float) -> TableAnswer:
+        return predict_table(
+            source, target, inputs=inputs, model=None, level=0.95, db=str(database)
+        )
 
     return run
 
@@ -60,8 +62,8 @@ def rows_of(path: Path) -> list[dict[str, str]]:
 def test_rows_are_answered_or_say_why_not(answer: Answer, tmp_path: Path) -> None:
     source, target = tmp_path / "a.csv", tmp_path / "b.csv"
     source.write_text(TABLE)
-    told = answer(source, target)
-    assert (told.rows, told.answered, told.without_answer) == (4, 3, 1)
+    document = answer(source, target)
+    assert (document.rows, document.answered, document.without_answer) == (4, 3, 1)
     first, second, third, fourth = rows_of(target)
     assert first["block_id"] == "A, upper"
     expected = predict(3.0, 0.1, pgv_m_s=0.6, db=str(tmp_path / "model.db"))
@@ -92,12 +94,12 @@ def test_a_table_has_one_range_for_its_total(tmp_path: Path, sites: int) -> None
     n = 200
     ys = np.random.default_rng(0).uniform(0.05, 0.2, n)
     rows = "".join(f"{i},3.0,{ys[i]},0.6,s{i % sites}\n" for i in range(n))
-    told = total_of(tmp_path, SHARED, rows)
-    p = np.array([row["probability"] for row in told.blocks])
+    document = total_of(tmp_path, SHARED, rows)
+    p = np.array([row["probability"] for row in document.blocks])
     blocks = Placement.of(0.0, np.log(ys), site=np.arange(n) % sites, polarity=UNKNOWN)
     counts = JointSampler(LAW, blocks).failures(p, 20_000, np.random.default_rng(1)).sum(axis=1)
-    assert told.expected_failures == pytest.approx(p.sum())
-    low, high = told.failures_low, told.failures_high
+    assert document.expected_failures == pytest.approx(p.sum())
+    low, high = document.failures_low, document.failures_high
     assert np.quantile(counts, [0.05, 0.95]) == pytest.approx((low, high), abs=4.0)
     assert high - low > 2.0 * 1.645 * np.sqrt((p * (1.0 - p)).sum())
 
@@ -106,17 +108,17 @@ def test_of_many_rows_some_tell_what_pairs_share(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     rows = "".join(f"{i},3.0,{0.05 + 0.0005 * i},0.6,s{i % 9}\n" for i in range(300))
-    whole = total_of(tmp_path, SHARED, rows)
+    complete = total_of(tmp_path, SHARED, rows)
     monkeypatch.setattr(table_answers, "MOST_PAIRED", 100)
     (tmp_path / "model.db").unlink()
-    some = total_of(tmp_path, SHARED, rows)
+    subset = total_of(tmp_path, SHARED, rows)
     for name in ("failures_low", "failures_high"):
-        assert getattr(some, name) == pytest.approx(getattr(whole, name), rel=0.1)
+        assert getattr(subset, name) == pytest.approx(getattr(complete, name), rel=0.1)
 
 
 def test_what_is_not_known_of_a_total_is_none(tmp_path: Path) -> None:
-    told = total_of(tmp_path, None, "1,3.0,0.1,0.6,\n")
-    assert told.failures_low is told.failures_high is None
+    document = total_of(tmp_path, None, "1,3.0,0.1,0.6,\n")
+    assert document.failures_low is document.failures_high is None
     with pytest.raises(InputError, match="use the column site_id in a table"):
         predict_table(tmp_path / "a.csv", inputs={}, sites=3)
 
@@ -131,10 +133,10 @@ def test_parts_join_without_a_seam(
     lines = [f"{i},3.0,{value!r},0.6" for i, value in enumerate(kr.tolist())]
     source.write_text("\n".join([HEAD, *lines]))
     answer(source, target)
-    found = rows_of(target)
-    assert [row["block_id"] for row in found] == [str(i) for i in range(40)]
+    result = rows_of(target)
+    assert [row["block_id"] for row in result] == [str(i) for i in range(40)]
     expected = predict(3.0, kr, pgv_m_s=0.6, db=str(tmp_path / "model.db")).probability
-    assert [float(row["probability"]) for row in found] == pytest.approx(expected, rel=1e-12)
+    assert [float(row["probability"]) for row in result] == pytest.approx(expected, rel=1e-12)
 
 
 def test_a_measure_for_all_rows(answer: Answer, tmp_path: Path) -> None:
@@ -163,9 +165,9 @@ def test_an_empty_column_says_nothing(
     source.write_text(head + rows + "3,0.1,0.5,\n")
     assert answer(source, target, pgv_m_s=0.6).answered == 3  # the option fills the empty cells
     model = str(tmp_path / "model.db")
-    filled, _, own = (float(row["probability"]) for row in rows_of(target))
+    filled, _, expected = (float(row["probability"]) for row in rows_of(target))
     assert filled == pytest.approx(predict(3.0, 0.1, pgv_m_s=0.6, db=model).probability)
-    assert own == pytest.approx(predict(3.0, 0.1, pgv_m_s=0.5, db=model).probability)
+    assert expected == pytest.approx(predict(3.0, 0.1, pgv_m_s=0.5, db=model).probability)
     monkeypatch.setattr(parts, "ROWS", 2)
     source.write_text(head + rows.replace(",,", ",0.6,") + "3,0.1,0.6,0.5\n")
     with pytest.raises(InputError, match="pga_g is empty in the first rows and filled"):
@@ -211,10 +213,10 @@ def test_a_bad_row_far_down_is_answered_with_its_reason(answer: Answer, tmp_path
     lines = [f"{i},3,0.1,0.6" for i in range(100_000)]
     lines[70_000], lines[80_000] = "x,3,?,0.6", "y,3,0.1"
     source.write_text("\n".join([HEAD, *lines]))
-    told = answer(source, target)
-    assert (told.rows, told.answered, told.without_answer) == (100_000, 99_998, 2)
-    assert "2 of 100,000 blocks could not be used" in str(told.warnings)
-    assert "line 70002: kr = '?' is not a number" in str(told.warnings)
+    document = answer(source, target)
+    assert (document.rows, document.answered, document.without_answer) == (100_000, 99_998, 2)
+    assert "2 of 100,000 blocks could not be used" in str(document.warnings)
+    assert "line 70002: kr = '?' is not a number" in str(document.warnings)
     rows = rows_of(target)
     assert {row["probability"] for row in rows[:70_000]} == {rows[-1]["probability"]} != {""}
     assert (rows[70_000]["kr"], rows[70_000]["probability"]) == ("?", "")
@@ -241,15 +243,15 @@ def test_parquet(answer: Answer, tmp_path: Path) -> None:
     }
     source, target = tmp_path / "a.parquet", tmp_path / "b.parquet"
     write_block_table(columns, source)
-    told = answer(source, target)
-    assert (told.rows, told.without_answer) == (50, 1)
-    found = read_columns(target, ["probability", "kr"])
+    document = answer(source, target)
+    assert (document.rows, document.without_answer) == (50, 1)
+    parsed = read_columns(target, ["probability", "kr"])
     expected = predict(
         columns["p2_1_s2"], columns["kr"], pgv_m_s=columns["pgv_m_s"],
         db=str(tmp_path / "model.db"),
     ).probability  # fmt: skip
-    assert np.array_equal(found["probability"], expected, equal_nan=True)
-    assert np.array_equal(found["kr"], columns["kr"])
+    assert np.array_equal(parsed["probability"], expected, equal_nan=True)
+    assert np.array_equal(parsed["kr"], columns["kr"])
     assert (
         read_columns(target, (), texts=["block_id"])["block_id"].tolist()
         == columns["block_id"].tolist()
@@ -263,20 +265,22 @@ def test_tables_of_blocks_that_slide_or_slump(tmp_path: Path) -> None:
     source.write_text(
         "block_id,ky,beta_deg,mode\na,0.1,10,slide\nb,-0.1,10,slide\nc,0.1,10,topple\n"
     )
-    given = {"displacement_m": 0.05, "pgv_m_s": 0.4, "pga_g": 0.5}
-    told = predict_table(source, target, inputs=given, model=None, level=0.95, db=str(REFERENCE))
-    assert (told.kind, told.rows, told.answered) == ("sliding", 3, 2)
+    arguments = {"displacement_m": 0.05, "pgv_m_s": 0.4, "pga_g": 0.5}
+    document = predict_table(
+        source, target, inputs=arguments, model=None, level=0.95, db=str(REFERENCE)
+    )
+    assert (document.kind, document.rows, document.answered) == ("sliding", 3, 2)
     assert [row["kind"] for row in rows_of(target)] == ["sliding", "sliding", "toppling"]
     first, second, third = rows_of(target)
-    expected = predict(ky=0.1, beta_deg=10.0, **given, db=str(REFERENCE))
+    expected = predict(ky=0.1, beta_deg=10.0, **arguments, db=str(REFERENCE))
     assert float(first["probability"]) == pytest.approx(expected.probability, rel=1e-12)
     assert (second["probability"], second["reason"]) == ("1", "unstable")
     assert "mode is topple, and p2 is missing" in third["reason"]
     source.write_text("ks,ps2_1_s2,pgv_m_s,pga_g\n0.1,3,0.5,0.6\n")
-    told = predict_table(
+    document = predict_table(
         source, target, inputs={}, model=None, level=0.95, db=str(REFERENCE), rotation_deg=2.0
     )
-    assert told.model == "slumping-2deg-pgv_pga"
+    assert document.model == "slumping-2deg-pgv_pga"
     expected = predict(ks=0.1, ps2=3.0, rotation_deg=2.0, pgv_m_s=0.5, pga_g=0.6, db=str(REFERENCE))
     (row,) = rows_of(target)
     assert float(row["probability"]) == pytest.approx(expected.probability, rel=1e-12)

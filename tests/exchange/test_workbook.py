@@ -35,8 +35,8 @@ def save(path: Path, *rows: tuple[object, ...]) -> Path:
     return path
 
 
-def answer(source: Path, target: Path, **given: float) -> TableAnswer:
-    return predict_table(source, target, inputs=given, model=None, level=0.95, db=None)
+def answer(source: Path, target: Path, **arguments: float) -> TableAnswer:
+    return predict_table(source, target, inputs=arguments, model=None, level=0.95, db=None)
 
 
 def rows_of(path: Path) -> list[dict[str, object]]:
@@ -61,10 +61,10 @@ def test_a_workbook_is_answered_row_by_row_as_csv_is(tmp_path: Path) -> None:
     book = openpyxl.load_workbook(source)
     book.active["E2"].data_type = "s"  # a text, as our own writer has it, not a formula
     book.save(source)
-    told = answer(source, tmp_path / "out.xlsx")
-    assert (told.rows, told.answered) == (7, 2)
-    assert "5 of 7 blocks could not be used" in str(told.warnings)
-    assert "row 3: kr is the date 2024-03-01" in str(told.warnings)
+    document = answer(source, tmp_path / "out.xlsx")
+    assert (document.rows, document.answered) == (7, 2)
+    assert "5 of 7 blocks could not be used" in str(document.warnings)
+    assert "row 3: kr is the date 2024-03-01" in str(document.warnings)
     rows = rows_of(tmp_path / "out.xlsx")
     plain = tmp_path / "plain.csv"
     plain.write_text("p2_1_s2,kr,pgv_m_s\n3,0.1,0.6\n")
@@ -86,9 +86,9 @@ def test_a_workbook_is_answered_row_by_row_as_csv_is(tmp_path: Path) -> None:
     assert "6 cells under 5 columns" in reasons[5]
     for name in ("out.csv", "out.parquet"):
         answer(source, tmp_path / name)
-        found = read_columns(tmp_path / name, ("probability",), texts=("reason",))
-        assert np.isfinite(found["probability"]).tolist() == [True, False, True] + [False] * 4
-        assert found["reason"].tolist()[3:] == reasons[3:]
+        parsed = read_columns(tmp_path / name, ("probability",), texts=("reason",))
+        assert np.isfinite(parsed["probability"]).tolist() == [True, False, True] + [False] * 4
+        assert parsed["reason"].tolist()[3:] == reasons[3:]
     again = answer(tmp_path / "out.xlsx", tmp_path / "again.xlsx")
     assert (again.rows, again.answered) == (7, 3)  # the cell beside the table is gone
 
@@ -143,9 +143,9 @@ def test_rows_above_the_names_of_csv(tmp_path: Path, delimiter: str) -> None:
     title = 'Survey, of 12.5. and\n"two\nlines"\n\n'
     for count in (3, 150_000):
         source.write_text("\n".join([title + names, *[row] * count, ""]))
-        told = answer(source, target)
-        assert (told.rows, told.answered) == (count, count)
-        assert [*told.warnings] == [
+        document = answer(source, target)
+        assert (document.rows, document.answered) == (count, count)
+        assert [*document.warnings] == [
             SINGLE_ASSUMED,
             "the names of the columns are in line 5: the lines above are ignored",
         ]
@@ -157,10 +157,10 @@ def test_rows_above_the_names_of_csv(tmp_path: Path, delimiter: str) -> None:
 def test_a_point_among_decimal_commas_is_not_guessed_at(tmp_path: Path) -> None:
     source = tmp_path / "a.csv"
     source.write_text("p2_1_s2;kr;pgv_m_s\n3;0,1;0,6\n3;1.234;0,6\n")
-    told = answer(source, tmp_path / "b.csv")
-    assert told.answered == 1
+    document = answer(source, tmp_path / "b.csv")
+    assert document.answered == 1
     words = "kr = '1.234' has a decimal point, and the table has decimal commas"
-    assert words in str(told.warnings)
+    assert words in str(document.warnings)
     source.write_text('p2_1_s2,kr\n3,"0,1"\n')
     assert answer(source, tmp_path / "b.csv", pgv_m_s=0.6).answered == 1
     source.write_text('p2_1_s2,kr\n3,"1,100"\n')
@@ -174,10 +174,10 @@ def test_one_bad_row_of_many(tmp_path: Path) -> None:
     kr[5_432] = "?"
     source, target = tmp_path / "a.xlsx", tmp_path / "b.csv"
     write_block_table({"p2_1_s2": np.full(size, 3.0), "kr": kr}, source)
-    told = answer(source, target, pgv_m_s=0.6)
-    assert (told.rows, told.without_answer) == (size, 1)
-    assert "1 of 10,000 blocks could not be used" in str(told.warnings)
-    assert "row 5434: kr = '?' is not a number" in str(told.warnings)
+    document = answer(source, target, pgv_m_s=0.6)
+    assert (document.rows, document.without_answer) == (size, 1)
+    assert "1 of 10,000 blocks could not be used" in str(document.warnings)
+    assert "row 5434: kr = '?' is not a number" in str(document.warnings)
 
 
 @pytest.mark.parametrize(
@@ -215,10 +215,10 @@ for act in (lambda: table_path("a.xlsx"), lambda: read_blocks("a.xlsx")):
     except MissingExtraError as error:
         print(error)
 """
-    done = subprocess.run(
+    process = subprocess.run(
         [sys.executable, "-c", program], capture_output=True, text=True, check=False, cwd=tmp_path
     )
-    assert done.stdout.count("pip install 'rbfrag[excel]'") == 2, done.stderr
+    assert process.stdout.count("pip install 'rbfrag[excel]'") == 2, process.stderr
 
 
 def save_ods(path: Path, **sheets: list[tuple[object, ...]]) -> Path:
@@ -236,9 +236,9 @@ def test_an_open_document_spreadsheet_is_answered_as_a_workbook_is(tmp_path: Pat
     rows = [HEAD, (1, 3, 0.1, 0.6, "y"), ("b", 3.5, "0,1", 0.6, None), ("c", 3, None, 0.6, "x")]
     source = save_ods(tmp_path / "blocks.ods", blocks=rows, other=[("kr",), (0.1,)])
     save(tmp_path / "blocks.xlsx", *rows)
-    told = answer(source, tmp_path / "a.csv")
+    document = answer(source, tmp_path / "a.csv")
     same = answer(tmp_path / "blocks.xlsx", tmp_path / "b.csv")
-    assert (told.rows, told.without_answer) == (same.rows, same.without_answer) == (3, 1)
+    assert (document.rows, document.without_answer) == (same.rows, same.without_answer) == (3, 1)
     first, second = (
         read_columns(tmp_path / name, ("probability",), texts=("block_id",))
         for name in ("a.csv", "b.csv")
@@ -272,8 +272,8 @@ def test_text_in_utf_16(tmp_path: Path, delimiter: str, encoding: str) -> None:
     mark = b"" if encoding == "utf-16" else b"\xfe\xff"
     (tmp_path / "blocks.csv").write_bytes(mark + text.encode(encoding))
     answer(tmp_path / "blocks.csv", tmp_path / "out.csv")
-    found = (tmp_path / "out.csv").read_text(encoding="utf-8-sig")
-    assert "Größe" in found
+    result = (tmp_path / "out.csv").read_text(encoding="utf-8-sig")
+    assert "Größe" in result
     # Excel's "Unicode text": a hazard curve and an accelerogram, too
     curve = "pgv_m_s,annual_rate\r\n0.1,0.01\r\n0.5,0.001\r\n"
     (tmp_path / "curve.csv").write_bytes(mark + curve.encode(encoding))

@@ -42,13 +42,13 @@ def critical_values(
     x = {"pgv": pgv, "pga_tm": pga * G * tm / (2 * np.pi), "pgd_tm": 2 * np.pi * pgd / tm}[term]
     v = sum(c * x**k for k, c in enumerate(variance))
     common = random.normal(size=events)[event]
-    own = random.normal(size=n)
+    expected = random.normal(size=n)
     y = line[0] + line[1] * x
-    y = y + np.sqrt(v) * (np.sqrt(event_share) * common + np.sqrt(1 - event_share) * own)
+    y = y + np.sqrt(v) * (np.sqrt(event_share) * common + np.sqrt(1 - event_share) * expected)
     p2 = np.tile(P2, 2 * n_motions)
     kr = y * np.sqrt(p2) / G
-    found = kr > 0.01 * pga if censor else np.ones(n, dtype=bool)
-    keep = lambda a: np.where(found, a, np.nan)  # noqa: E731
+    result = kr > 0.01 * pga if censor else np.ones(n, dtype=bool)
+    keep = lambda a: np.where(result, a, np.nan)  # noqa: E731
     return CombinationTable(
         combination_id=np.arange(1, n + 1),
         motion_id=motion + 1,
@@ -56,7 +56,7 @@ def critical_values(
         event_guessed=np.zeros(n, dtype=bool),
         polarity=np.tile(np.repeat(["forward", "reverse"], len(P2)), n_motions).astype(object),
         p2=p2,
-        status=np.where(found, "found", "below_limit").astype(object),
+        status=np.where(result, "found", "below_limit").astype(object),
         search_limit=np.full(n, 0.01),
         kr_over_pga=keep(kr / pga),
         upper=np.full(len(p2), np.nan),

@@ -37,7 +37,7 @@ def drawn(kind: str, term: str, n: int = 4000, seed: int = 1) -> FitSource:
     event = np.sort(rng.integers(0, 20, n))
     pulse = np.exp(rng.normal(-2.5, 0.5, n))
     z = rng.standard_normal(n)
-    found = np.ones(n, dtype=bool)
+    result = np.ones(n, dtype=bool)
     if kind == "sliding":
         pga = np.exp(rng.normal(-1.5, 0.6, n))
         values = {
@@ -52,7 +52,7 @@ def drawn(kind: str, term: str, n: int = 4000, seed: int = 1) -> FitSource:
         slid = np.exp((unit.eta + z) * np.exp(unit.log_sigma))
         assert (slid < LEAST_DISPLACEMENT_M).any()
         k = values["ky"] / pga
-        table = _table(event, pga, values["pgv_m_s"], found, k, np.full(n, np.nan))
+        table = _table(event, pga, values["pgv_m_s"], result, k, np.full(n, np.nan))
         of_motion = {name: values[name] for name in ("magnitude", "arias_m_s")}
         return FitSource(
             replace(table, measures={**table.measures, **of_motion}),
@@ -73,7 +73,7 @@ def drawn(kind: str, term: str, n: int = 4000, seed: int = 1) -> FitSource:
     eta = METHOD_OF[kind].forms[term].eta(TRUE[kind, term], values, arrays()).eta
     failed = (eta > rng.standard_normal(eta.shape)).astype(float)
     pgv = pulse * pga * STANDARD_GRAVITY_M_S2
-    table = _table(event, pga, pgv, found & False, np.full(n, np.nan), ps2, ks, magnitude)
+    table = _table(event, pga, pgv, result & False, np.full(n, np.nan), ps2, ks, magnitude)
     return FitSource(table, np.full(n, np.nan), ratio, failed)
 
 
@@ -81,7 +81,7 @@ def _table(
     event: NDArray[np.int64],
     pga: NDArray[np.float64],
     pgv: NDArray[np.float64],
-    found: NDArray[np.bool_],
+    result: NDArray[np.bool_],
     k_over_pga: NDArray[np.float64],
     p2: NDArray[np.float64],
     yield_g: NDArray[np.float64] | None = None,
@@ -96,7 +96,7 @@ def _table(
         event_guessed=np.zeros(n, dtype=bool),
         polarity=np.full(n, "forward", dtype=object),
         p2=p2,
-        status=np.where(found, "found", "not_searched").astype(object),
+        status=np.where(result, "found", "not_searched").astype(object),
         search_limit=np.full(n, 0.01),
         kr_over_pga=k_over_pga,
         upper=np.full(len(p2), np.nan),

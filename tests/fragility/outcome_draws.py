@@ -65,12 +65,12 @@ def drawn_outcomes(
     from scipy.special import ndtr
 
     common = random.normal(size=events)[event][:, None]
-    own = random.normal(size=y0.shape)
-    uniform = ndtr(np.sqrt(shared) * common + np.sqrt(1.0 - shared) * own)
+    expected = random.normal(size=y0.shape)
+    uniform = ndtr(np.sqrt(shared) * common + np.sqrt(1.0 - shared) * expected)
     topples = (uniform < probability).astype(float)
     n = motion.size
     y = np.where(topples.any(axis=1), np.where(topples > 0.5, y0, 0.0).max(axis=1), np.nan)
-    found = np.isfinite(y)
+    result = np.isfinite(y)
     table = CombinationTable(
         combination_id=np.arange(1, n + 1),
         motion_id=motion + 1,
@@ -78,7 +78,7 @@ def drawn_outcomes(
         event_guessed=np.zeros(n, dtype=bool),
         polarity=np.full(n, "forward", dtype=object),
         p2=p2,
-        status=np.where(found, "found", "below_limit").astype(object),
+        status=np.where(result, "found", "below_limit").astype(object),
         search_limit=np.full(n, 0.01),
         kr_over_pga=y * p / (G * pga),
         upper=np.full(len(p2), np.nan),

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
+from numpy.typing import NDArray
 from scipy.special import ndtr
 
 from rbfrag.fragility.dependence import Dependence
@@ -23,6 +26,25 @@ def anywhere(n: int, seed: int) -> Placement:
         random.uniform(-1.2, 1.7, n), random.normal(size=n), random.integers(2, size=n),
         random.integers(3, size=n), random.integers(2, size=n), random.choice((-1, 1), size=n),
     )  # fmt: skip
+
+
+def correlation(law: Dependence, blocks: Placement) -> NDArray[np.float64]:
+    """Return the correlation matrix R of blocks of known azimuth, shape (n, n)."""
+
+    def pairs(column: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any]]:
+        return column[:, None], column[None, :]
+
+    earthquake, site, component = (
+        np.equal(*pairs(label)) for label in (blocks.earthquake, blocks.site, blocks.component)
+    )
+    r = law.of_pairs(
+        np.abs(np.subtract(*pairs(blocks.l))), np.abs(np.subtract(*pairs(blocks.ln_y))),
+        earthquake & site, earthquake & site & component,
+        np.multiply.outer(blocks.polarity, blocks.polarity).astype(np.float64),
+    )  # fmt: skip
+    r *= earthquake
+    np.fill_diagonal(r, 1.0)
+    return r
 
 
 def bivariate_normal(a, b, r):

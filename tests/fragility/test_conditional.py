@@ -88,7 +88,7 @@ def test_a_slump_fails_by_its_rotation_from_its_first_place_or_past_recovery() -
         slump(0.04, 0.05, 0.0),
     ]
     by_rotation, by_recovery = (
-        conditional_shares(rows, "peak_rad", (each,)) for each in (limit, None)
+        conditional_shares(rows, "peak_rad", (item,)) for item in (limit, None)
     )
     (share,) = by_rotation
     assert (share.blocks, share.fails, share.intact_fails, share.unknown) == (4, 3, 1, 1)
@@ -132,18 +132,18 @@ def test_where_no_or_every_block_fails_the_interval_is_the_exact_one(all_fail: b
     share = share_of_events(np.full(30, all_fail), np.repeat(np.arange(6), 5))
     exact = stats.binomtest(6 * all_fail, 6).proportion_ci(0.95, "exact")
     assert (share.ci_low, share.ci_high) == pytest.approx((exact.low, exact.high), rel=1e-12)
-    one = share_of_events(np.array([True, False]), np.zeros(2, dtype=int))
-    assert (one.ci_low, one.ci_high) == (0.0, 1.0)
+    single = share_of_events(np.array([True, False]), np.zeros(2, dtype=int))
+    assert (single.ci_low, single.ci_high) == (0.0, 1.0)
 
 
 def test_the_interval_covers_the_share_behind_blocks_that_fail_together() -> None:
     # earthquakes whose shares scatter: beta of mean 0.4
     random = np.random.default_rng(5)
-    events, each, covered, sets = 25, 8, 0, 600
+    events, separate, covered, sets = 25, 8, 0, 600
     for _ in range(sets):
         shares = random.beta(0.8, 1.2, size=events)
-        fails = random.random((events, each)) < shares[:, None]
-        share = share_of_events(fails.ravel(), np.repeat(np.arange(events), each))
+        fails = random.random((events, separate)) < shares[:, None]
+        share = share_of_events(fails.ravel(), np.repeat(np.arange(events), separate))
         covered += share.ci_low <= 0.4 <= share.ci_high
     assert 0.92 < covered / sets < 0.985
 

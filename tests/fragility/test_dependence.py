@@ -16,8 +16,8 @@ from scipy.stats import binom
 
 from rbfrag.errors import InputError
 from rbfrag.fragility.dependence import Dependence, normal_quantile
-from rbfrag.fragility.joint import share_range
-from tests.fragility.portfolio_draws import LAW, anywhere
+from rbfrag.fragility.joint import Placement, share_range
+from tests.fragility.portfolio_draws import LAW, anywhere, correlation
 
 
 def test_correlation_is_the_formula_term_by_term() -> None:
@@ -36,14 +36,11 @@ def test_correlation_is_the_formula_term_by_term() -> None:
         (([0, 0], [0, 0], [0, 0], [1, -1]),
          (LAW.rho_e + LAW.rho_s) * e + (LAW.rho_v * v - LAW.rho_o * o) * y),
     ):  # fmt: skip
-        r = LAW.correlation(ln_p, ln_y, *label)
+        names = ("earthquake", "site", "component", "polarity")
+        labels = dict(zip(names, label, strict=True))
+        r = correlation(LAW, Placement.of(ln_p, ln_y, **labels))
         assert r[0, 1] == r[1, 0] == pytest.approx(expected, abs=1e-15)
         assert r[0, 0] == r[1, 1] == 1.0
-
-
-def test_labels_may_be_text() -> None:
-    r = LAW.correlation([0, 0], [0, 0], ["a", "a"], ["s", "s"], ["NS", "EW"], [1, -1])
-    assert r[0, 1] == pytest.approx(LAW.rho_e + LAW.rho_s)
 
 
 @given(
@@ -57,7 +54,7 @@ def test_correlations_are_positive_semidefinite(
 ) -> None:
     parts = np.array(share) / sum(share)
     law = Dependence(*parts[:3], max(0.0, 1.0 - float(parts[:3].sum())), *length)
-    r = anywhere(25, seed).correlation(law)
+    r = correlation(law, anywhere(25, seed))
     assert np.linalg.eigvalsh(r).min() > -1e-9
 
 
@@ -71,8 +68,6 @@ def test_what_is_no_dependence_is_rejected() -> None:
     for length in (0.0, -1.0, math.inf, math.nan):
         with pytest.raises(InputError, match="l_y is a length above 0"):
             replace(LAW, l_y=length)
-    with pytest.raises(InputError, match="draw unknown azimuths"):
-        LAW.correlation([0, 0], [0, 0], [0, 0], [0, 0], [0, 0], [1, 0])
 
 
 RECORDED = {
@@ -99,10 +94,10 @@ def test_ranges_are_those_of_simulated_earthquakes(p: float, sites: int) -> None
     law, n = RECORDED["pgv_pga"], 4 * sites
     r = np.full((n, n), law.rho_e)
     site, side = np.repeat(np.arange(sites), 4), np.tile([0, 1, 2, 3], sites)
-    here = site[:, None] == site
-    r += here * law.rho_s
+    local = site[:, None] == site
+    r += local * law.rho_s
     sign = np.where(side[:, None] % 2 == side % 2, 1.0, -1.0)
-    r += here * (side[:, None] // 2 == side // 2) * (law.rho_v + sign * law.rho_o)
+    r += local * (side[:, None] // 2 == side // 2) * (law.rho_v + sign * law.rho_o)
     z = np.random.default_rng(1).multivariate_normal(np.zeros(n), r, 40_000, method="cholesky")
     share = (z <= ndtri(p)).mean(axis=1)
     low, high = share_range(p, law, sites)
@@ -138,7 +133,7 @@ def test_ranges_of_many_are_those_of_each() -> None:
 
 def test_normal_quantile_is_that_of_scipy() -> None:
     p = np.concatenate([10.0 ** -np.arange(1.0, 300.0, 7.0), np.linspace(0.001, 0.999, 999)])
-    mine = np.array([normal_quantile(one) for one in p.tolist()])
+    mine = np.array([normal_quantile(item) for item in p.tolist()])
     np.testing.assert_allclose(mine, ndtri(p), rtol=1e-13, atol=1e-15)
 
 

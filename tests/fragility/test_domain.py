@@ -16,8 +16,7 @@ from rbfrag.errors import ModelError
 from rbfrag.exchange.database_tables import read_table
 from rbfrag.fragility.domain import RATIOS, ratios_of
 from rbfrag.fragility.fit.data import FitData, fit_data
-from rbfrag.fragility.fit.domain import joint_scatter
-from rbfrag.fragility.fit.fitting import fit_source
+from rbfrag.fragility.fit.fitting import fit_source, joint_scatter
 from rbfrag.fragility.measures import TERMS
 from rbfrag.fragility.method import SINGLE
 from rbfrag.fragility.methods import method_named
@@ -62,8 +61,8 @@ def fitted(source: Any) -> FragilityModel:
     return fit_source(source, TERM, METHOD).report.model
 
 
-def one(model: FragilityModel | ModelRow, **asked: float) -> Prediction:
-    answer = predict(**asked, model=model)
+def predict_block(model: FragilityModel | ModelRow, **inputs: float) -> Prediction:
+    answer = predict(**inputs, model=model)
     assert isinstance(answer, Prediction)
     return answer
 
@@ -88,8 +87,8 @@ def test_points_of_the_fit_are_in_the_domain(fitted: FragilityModel, data: FitDa
     answer = many(fitted, columns)
     allowed = (columns["kr"] < columns["pga_g"]) & (answer.y_m_s < 2.0 * columns["pgv_m_s"])
     assert 0.9949 <= answer.in_domain[allowed].mean() < 1.0
-    told = {text for text in answer.reason[allowed] if text}
-    assert told == {
+    values = {text for text in answer.reason[allowed] if text}
+    assert values == {
         "the combination of p2, kr, pgv_m_s, pga_g and tm_s is farther from the centre of the "
         "fitted data than 99.5 % of them: the answer is an extrapolation"
     }
@@ -104,7 +103,7 @@ def test_contradictory_measures_are_named() -> None:
         covariance=tuple(tuple(0.01 * (i == j) for j in range(size)) for i in range(size)),
         domain=REFERENCE_DOMAIN, data_fingerprint="f",
     )  # fmt: skip
-    answer = one(row, **given_by_issue())
+    answer = predict_block(row, **given_by_issue())
     assert not answer.in_domain
     assert domain_sentences(answer) == [
         "a PGV of 0.169 m/s is inconsistent with a PGA of 0.906 g and a Tm of 1.6 s: "
@@ -120,16 +119,16 @@ def test_contradictory_measures_are_named() -> None:
         "the answer is an extrapolation"
     )
     # a motion that goes together, and one number that is out of its range by itself
-    assert one(row, **{**given_by_issue(), "pgv_m_s": 1.6}).in_domain
-    size_alone = one(row, **{**given_by_issue(), "pgv_m_s": 1.6, "p2": 40.0})
+    assert predict_block(row, **{**given_by_issue(), "pgv_m_s": 1.6}).in_domain
+    size_alone = predict_block(row, **{**given_by_issue(), "pgv_m_s": 1.6, "p2": 40.0})
     assert [t.split(" is ")[0] for t in domain_sentences(size_alone)] == ["p2 = 40 1/s²"]
 
 
 def test_measures_that_the_model_does_not_read_are_judged_too(model: FragilityModel) -> None:
     row = replace(model.row, domain={**model.row.domain, "pgv_over_pga_tm": (0.5, 2.8)})
-    given_ = {**given_by_issue(), "tm_s": 1.4}
-    assert one(row, p2=9.5, kr=0.053, pgv_m_s=0.169).in_domain
-    beside = one(row, **given_)
+    inputs = {**given_by_issue(), "tm_s": 1.4}
+    assert predict_block(row, p2=9.5, kr=0.053, pgv_m_s=0.169).in_domain
+    beside = predict_block(row, **inputs)
     assert not beside.in_domain
     assert (
         "a PGV of 0.169 m/s is inconsistent with a PGA of 0.906 g and a Tm of 1.4 s"
@@ -143,14 +142,17 @@ def test_scaling_pgv_alone_leaves_the_domain(
     fitted: FragilityModel, data: FitData, i: int, factor: float
 ) -> None:
     columns = columns_of(data)
-    own = {name: float(v[i % v.size]) for name, v in columns.items()}
-    own["kr"] = min(own["kr"], 0.5 * own["pga_g"])
-    answer = one(fitted, **{**own, "pgv_m_s": own["pgv_m_s"] * factor})
+    block_inputs = {name: float(v[i % v.size]) for name, v in columns.items()}
+    block_inputs["kr"] = min(block_inputs["kr"], 0.5 * block_inputs["pga_g"])
+    answer = predict_block(fitted, **{**block_inputs, "pgv_m_s": block_inputs["pgv_m_s"] * factor})
     assert not answer.in_domain
     assert any("a PGV of" in text and "is inconsistent with" in text for text in answer.warnings)
     # the whole motion scaled, the block's strength with it, contradicts nothing
-    scaled = {name: own[name] * factor for name in ("kr", "pgv_m_s", "pga_g")}
-    assert not any("does not go" in text for text in one(fitted, **{**own, **scaled}).warnings)
+    scaled = {name: block_inputs[name] * factor for name in ("kr", "pgv_m_s", "pga_g")}
+    assert not any(
+        "does not go" in text
+        for text in predict_block(fitted, **{**block_inputs, **scaled}).warnings
+    )
 
 
 def test_arrays_agree_with_scalars(fitted: FragilityModel, data: FitData) -> None:
@@ -162,12 +164,12 @@ def test_arrays_agree_with_scalars(fitted: FragilityModel, data: FitData) -> Non
     answer = many(fitted, columns)
     assert 20 < answer.in_domain.sum() < n - 20
     for i in range(n):
-        alone = one(fitted, **{name: float(v[i]) for name, v in columns.items()})
+        alone = predict_block(fitted, **{name: float(v[i]) for name, v in columns.items()})
         assert answer.probability[i] == pytest.approx(alone.probability, rel=1e-12, abs=1e-250)
         assert answer.in_domain[i] == alone.in_domain
-        others = len(fitted.notes) + (SINGLE_ASSUMED in alone.warnings)
-        others += any("Check the unit" in text for text in alone.warnings)
-        assert len(alone.warnings) - others == len([r for r in answer.reason[i].split("; ") if r])
+        rest = len(fitted.notes) + (SINGLE_ASSUMED in alone.warnings)
+        rest += any("Check the unit" in text for text in alone.warnings)
+        assert len(alone.warnings) - rest == len([r for r in answer.reason[i].split("; ") if r])
 
 
 def test_a_single_block_under_many_motions(fitted: FragilityModel, data: FitData) -> None:
@@ -199,21 +201,21 @@ def test_a_direction_without_scatter_counts_nothing() -> None:
     random = np.random.default_rng(0)
     a = np.exp(random.normal(size=(500, 1)))
     values = {"a": a, "b": 2.0 * a, "c": np.full((500, 1), 3.0)}
-    found: Any = joint_scatter(("a", "b", "c"), values, np.ones((500, 1), dtype=np.bool_))
-    inverse = np.array(found["inverse_covariance"])
+    result: Any = joint_scatter(("a", "b", "c"), values, np.ones((500, 1), dtype=np.bool_))
+    inverse = np.array(result["inverse_covariance"])
     assert np.isfinite(inverse).all()
     assert np.abs(inverse[2]).max() < 1e-30
-    inside = np.abs(np.log(a) - found["centre"][0]) / np.log(a).std(ddof=1) <= found["radius"]
+    inside = np.abs(np.log(a) - result["centre"][0]) / np.log(a).std(ddof=1) <= result["radius"]
     assert inside.sum() == 498  # 99.5 % of 500, the point at the edge included
 
 
 def test_z_is_judged_only_where_its_range_says_more(model: FragilityModel) -> None:
-    known = ("p", "pgv_m_s", "pga_g")
+    expected = ("p", "pgv_m_s", "pga_g")
     wide = {"pgv_over_pga_s": (0.01, 0.4), "z": (0.003, 2.2)}
-    assert [r.name for r in ratios_of(known)] == ["pgv_over_pga_s", "z"]
+    assert [r.name for r in ratios_of(expected)] == ["pgv_over_pga_s", "z"]
     for z, judged in (((0.003, 2.2), False), ((0.01, 2.2), True), ((0.003, 1.0), True)):
         row = replace(model.row, domain={**model.row.domain, **wide, "z": z})
-        names = [ratio.name for ratio in FragilityModel.from_row(row).ratios_of(known)]
+        names = [ratio.name for ratio in FragilityModel.from_row(row).ratios_of(expected)]
         assert ("z" in names) is judged
 
 
@@ -234,12 +236,12 @@ def test_ratios_do_not_change_with_the_scale_of_the_motion() -> None:
     [{}, {"names": ["p2", "kr"]}, {"centre": [0.0]}, {"inverse_covariance": [[1.0]]}],
 )
 def test_a_scatter_that_is_not_whole_is_rejected(model: FragilityModel, broken: Any) -> None:
-    whole = {
+    complete = {
         "names": ["p2", "kr", "pgv_m_s"], "centre": [0.0, -3.0, -1.0],
         "inverse_covariance": np.eye(3).tolist(), "radius": 3.0,
     }  # fmt: skip
-    assert FragilityModel.from_row(replace(model.row, diagnostics={"mahalanobis": whole})).spread
-    stored = {**whole, **broken} if broken else {}
+    assert FragilityModel.from_row(replace(model.row, diagnostics={"mahalanobis": complete})).spread
+    stored = {**complete, **broken} if broken else {}
     with pytest.raises(ModelError, match="fit it again"):
         FragilityModel.from_row(replace(model.row, diagnostics={"mahalanobis": stored}))
 
@@ -247,19 +249,21 @@ def test_a_scatter_that_is_not_whole_is_rejected(model: FragilityModel, broken: 
 def test_a_displacement_that_velocity_and_period_cannot_go_with_is_told_of() -> None:
     shaking = {"pgv_m_s": 0.6, "tm_s": 0.5}
     # a harmonic motion has PGD = PGV Tm / 2π, any other more
-    for pgd_m, told in ((0.02, True), (0.06, False), (1.0, False), (12.0, True)):
+    for pgd_m, output in ((0.02, True), (0.06, False), (1.0, False), (12.0, True)):
         answer = predict(3.0, 0.1, pgd_m=pgd_m, **shaking)
         text = f"a PGD of {pgd_m:.3g} m is inconsistent with a PGV of 0.6 m/s and a Tm of 0.5 s"
-        assert any(text in warning for warning in answer.warnings) is told
-        assert answer.in_domain is not told
+        assert any(text in warning for warning in answer.warnings) is output
+        assert answer.in_domain is not output
         many = predict(3.0, [0.1, 0.2], pgd_m=pgd_m, **shaking)
-        assert all(("PGD is inconsistent with PGV and Tm" in each) is told for each in many.reason)
-        assert many.in_domain.tolist() == [not told] * 2
+        assert all(
+            ("PGD is inconsistent with PGV and Tm" in item) is output for item in many.reason
+        )
+        assert many.in_domain.tolist() == [not output] * 2
 
 
 def test_the_range_of_a_ratio_that_the_shipped_motions_judge_is_theirs() -> None:
     motions = read_table("motion", db=REFERENCE)
     motions = motions[~motions.is_vertical]
-    for ratio in (each for each in RATIOS if each.shipped is not None):
+    for ratio in (item for item in RATIOS if item.shipped is not None):
         values = ratio.formula(motions)
         assert ratio.shipped == pytest.approx((values.min(), values.max()), rel=5e-3)

@@ -33,10 +33,10 @@ LOSS = {
 def test_a_model_tells_what_blocks_did_in_earthquakes_that_it_has_not_seen(name: str) -> None:
     stored = MODELS[name]
     failed = blocks(stored["kind"])["failed"]
-    found = loss_and_slope(probabilities(stored), failed)
-    assert found == pytest.approx((stored["log_loss"], stored["slope"]), rel=2e-3)
-    assert found[0] < LOSS[name] + BEYOND
-    assert 0.8 < found[1] < 1.9
+    result = loss_and_slope(probabilities(stored), failed)
+    assert result == pytest.approx((stored["log_loss"], stored["slope"]), rel=2e-3)
+    assert result[0] < LOSS[name] + BEYOND
+    assert 0.8 < result[1] < 1.9
     # as no other model does, were it but a twentieth surer
     other = loss_and_slope(probabilities(stored, 1.05), failed)
     assert other != pytest.approx((stored["log_loss"], stored["slope"]), rel=2e-3)

@@ -14,12 +14,7 @@ from scipy.stats import betabinom, binom, multivariate_normal
 
 from rbfrag.errors import InputError
 from rbfrag.fragility.dependence import Dependence
-from rbfrag.fragility.joint import (
-    Placement,
-    count_moments,
-    count_quantiles,
-    joint_excess,
-)
+from rbfrag.fragility.joint import Placement, count_moments, count_quantiles, joint_excess
 from rbfrag.fragility.joint_sampling import JointSampler
 from tests.fragility.portfolio_draws import LAW, anywhere, bivariate_normal
 
@@ -50,8 +45,8 @@ def test_bivariate_normal_is_its_integral_over_one_variable() -> None:
         upper = (b - r * x) / math.sqrt(1.0 - r * r)
         return math.exp(-0.5 * x * x) / math.sqrt(2.0 * math.pi) * float(ndtr(upper))
 
-    whole = quad(inner, -12.0, a, epsabs=1e-13)[0]
-    assert bivariate_normal(a, b, r) == pytest.approx(whole, abs=1e-12)
+    complete = quad(inner, -12.0, a, epsabs=1e-13)[0]
+    assert bivariate_normal(a, b, r) == pytest.approx(complete, abs=1e-12)
 
 
 def test_limits_of_the_excess() -> None:
@@ -64,8 +59,8 @@ def test_limits_of_the_excess() -> None:
 
 
 def test_one_block_and_equal_blocks_have_exact_moments() -> None:
-    one = Placement.of([0.3], [0.1])
-    assert count_moments([0.2], one, LAW, [3.0]) == pytest.approx((0.6, 9 * 0.16))
+    single = Placement.of([0.3], [0.1])
+    assert count_moments([0.2], single, LAW, [3.0]) == pytest.approx((0.6, 9 * 0.16))
     five = Placement.of(np.full(5, 0.3), 0.1)
     assert count_moments(np.full(5, 0.2), five, LAW) == pytest.approx((1.0, 25 * 0.16))
     counts = count_quantiles(5, 1.0, 25 * 0.16, [0.5, 0.79, 0.81])
@@ -94,9 +89,9 @@ def test_variance_is_that_of_samples(drawn: bool) -> None:
 
 def test_variance_of_many_blocks_is_summed_in_parts(monkeypatch: pytest.MonkeyPatch) -> None:
     blocks, p = anywhere(30, 1), np.linspace(0.01, 0.9, 30)
-    whole = count_moments(p, blocks, LAW)
+    complete = count_moments(p, blocks, LAW)
     monkeypatch.setattr("rbfrag.fragility.joint._PAIRS_AT_ONCE", 50)
-    assert count_moments(p, blocks, LAW) == pytest.approx(whole, rel=1e-13)
+    assert count_moments(p, blocks, LAW) == pytest.approx(complete, rel=1e-13)
 
 
 @given(
@@ -140,10 +135,10 @@ def test_what_is_no_portfolio_is_rejected() -> None:
         Placement.of([0.0], 0.0, polarity=2)
     with pytest.raises(InputError, match="must be 0 and 1"):
         Placement.of([0.0, 0.0], 0.0, component=[7, 0], polarity=[1, 0])
-    one = Placement.of([0.0], 0.0)
+    single = Placement.of([0.0], 0.0)
     with pytest.raises(InputError, match="1 blocks need as many probabilities"):
-        count_moments([0.1, 0.2], one, LAW)
+        count_moments([0.1, 0.2], single, LAW)
     with pytest.raises(InputError, match="not between 0 and 1"):
-        count_moments([1.1], one, LAW)
+        count_moments([1.1], single, LAW)
     with pytest.raises(InputError, match="weight"):
-        count_moments([0.1], one, LAW, [math.inf])
+        count_moments([0.1], single, LAW, [math.inf])

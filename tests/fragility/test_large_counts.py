@@ -7,8 +7,7 @@ import pytest
 from scipy.special import ndtr
 
 from rbfrag.fragility.joint import Placement
-from rbfrag.fragility.joint_sampling import JointSampler
-from rbfrag.fragility.large_counts import LargeCounts, _number
+from rbfrag.fragility.joint_sampling import JointSampler, LargeCounts, _number
 from rbfrag.solver.results import FloatArray
 from tests.fragility.portfolio_draws import LAW
 
@@ -35,9 +34,9 @@ def test_numbers_are_those_of_draws(n: int, sites: int, middle: float) -> None:
     random = np.random.default_rng(2)
     sampler = JointSampler(LAW, where)
     fails = np.concatenate([sampler.normals(200, random) <= bound for _ in range(DRAWS // 200)])
-    for one, other in zip(drawn, (fails.sum(axis=1), fails @ weight), strict=True):
-        assert one.mean() == pytest.approx(other.mean(), rel=0.03)
-        assert one.std() == pytest.approx(other.std(), rel=0.06)
+    for item, other in zip(drawn, (fails.sum(axis=1), fails @ weight), strict=True):
+        assert item.mean() == pytest.approx(other.mean(), rel=0.03)
+        assert item.std() == pytest.approx(other.std(), rel=0.06)
     assert drawn[0].mean() == pytest.approx(ndtr(bound).sum(), rel=0.02)
     assert with_any == pytest.approx(fails.any(axis=1).mean(), abs=0.02)
     low, high = np.quantile(fails.sum(axis=1), (0.05, 0.95))
@@ -47,16 +46,19 @@ def test_numbers_are_those_of_draws(n: int, sites: int, middle: float) -> None:
 def test_like_blocks_are_as_many_rows() -> None:
     where, bound = blocks(300, 40, -3.0)
     count = np.random.default_rng(1).integers(1, 6, 300)
-    each = np.repeat(np.arange(300), count)
-    one = np.ones(300)
+    separate = np.repeat(np.arange(300), count)
+    item = np.ones(300)
     rows = LargeCounts(LAW, where, count)
-    apart = LargeCounts(LAW, where.only(each), np.ones(each.size, dtype=np.int64))
+    apart = LargeCounts(LAW, where.only(separate), np.ones(separate.size, dtype=np.int64))
     draws = 20_000
     together, any_together = rows.sums(
-        bound, 0.0, rows.latent(draws, np.random.default_rng(1)), [(one, one)]
+        bound, 0.0, rows.latent(draws, np.random.default_rng(1)), [(item, item)]
     )
     single, any_single = apart.sums(
-        bound[each], 0.0, apart.latent(draws, np.random.default_rng(1)), [(one[each], one[each])]
+        bound[separate],
+        0.0,
+        apart.latent(draws, np.random.default_rng(1)),
+        [(item[separate], item[separate])],
     )
     assert together.mean() == pytest.approx(single.mean(), rel=0.01)
     assert together.std() == pytest.approx(single.std(), rel=0.03)
@@ -66,9 +68,13 @@ def test_like_blocks_are_as_many_rows() -> None:
 def test_what_a_site_shares_beside_z_widens_the_law() -> None:
     # fails where √(1-g) Z + √g ξ of the site is low enough: with ξ common to each site
     where, bound = blocks(1200, 30, -2.5)
-    large, one, share = LargeCounts(LAW, where, np.ones(1200, dtype=np.int64)), np.ones(1200), 0.3
+    large, single, share = (
+        LargeCounts(LAW, where, np.ones(1200, dtype=np.int64)),
+        np.ones(1200),
+        0.3,
+    )
     latent = large.latent(4 * DRAWS, np.random.default_rng(1))
-    drawn, _ = large.sums(bound, share, latent, [(one, one)])
+    drawn, _ = large.sums(bound, share, latent, [(single, single)])
     random, sampler, numbers = np.random.default_rng(2), JointSampler(LAW, where), []
     for _ in range(DRAWS // 200):
         xi = random.normal(size=(200, 30))[:, where.site]

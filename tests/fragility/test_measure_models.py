@@ -9,7 +9,6 @@ import pytest
 
 from rbfrag.db.location import REFERENCE
 from rbfrag.db.model_file import read_models
-from rbfrag.errors import ModelError, UnknownModelError
 from rbfrag.fragility.measures import TERMS
 from rbfrag.fragility.methods import method_named
 from rbfrag.fragility.model import FragilityModel
@@ -68,9 +67,9 @@ KR = np.geomspace(0.01, 1.5, 120)
 def test_shipped_models_are_those_of_the_other_study(method: str, term: str) -> None:
     b, errors, log_loss, log_loss_kr05, slope = TABLE[method, term]
     (row,) = (row for row in read_models(REFERENCE) if row.name == f"{method}-{term}")
-    found = np.array(list(row.coefficients.values()))
-    assert (np.abs(found - b) < np.array(errors)).all()
-    assert found == pytest.approx(b, abs=0.002)
+    result = np.array(list(row.coefficients.values()))
+    assert (np.abs(result - b) < np.array(errors)).all()
+    assert result == pytest.approx(b, abs=0.002)
     assert np.sqrt(np.diag(row.covariance)) == pytest.approx(errors, rel=0.16)
     scores = row.diagnostics["scores"]
     assert isinstance(scores, dict)
@@ -112,23 +111,6 @@ def test_models_for_comparison_answer_by_name_alone() -> None:
     assert answer.term == "pga_tm"
 
 
-@pytest.mark.parametrize(
-    ("name", "successor"),
-    [("bounded-pgv", "bounded-pgv_kr"), ("lognormal-pgv", "bounded-pgv_kr"),
-     ("logistic-sa20", "logistic-sa10")],
-)  # fmt: skip
-def test_retired_models_name_their_successors(name: str, successor: str) -> None:
-    with pytest.raises(UnknownModelError, match=f"no model '{name}' any more: use {successor}"):
-        predict(3.0, 0.1, pgv_m_s=0.4, model=name, db=REFERENCE)
-    assert name not in {row.name for row in read_models(REFERENCE)}
-
-
-def test_a_stored_model_of_a_retired_form_names_its_successor() -> None:
-    row = model_row("pgv", name="mine", method="bounded")
-    with pytest.raises(ModelError, match=r"'mine' has an obsolete form: use bounded-pgv_kr"):
-        FragilityModel.from_row(row)
-
-
 def test_blocks_beyond_those_that_were_fitted_are_told() -> None:
     for kr in (0.019, 1.01):
         answer = predict(3.0, kr, pgv_m_s=4.0, db=REFERENCE)
@@ -160,8 +142,8 @@ def arguments(term: str, measures: dict[str, np.ndarray]) -> dict[str, object]:
     """Return measures by name as arguments of predict."""
     periods = {name: period for period, name in SPECTRAL.items()}
     spectral = {periods[name]: value for name, value in measures.items() if name in periods}
-    others = {name: value for name, value in measures.items() if name not in periods}
-    return {**others, **({"sa_g": spectral} if spectral else {})}
+    rest = {name: value for name, value in measures.items() if name not in periods}
+    return {**rest, **({"sa_g": spectral} if spectral else {})}
 
 
 def shakings(rng: np.random.Generator, n: int) -> dict[str, np.ndarray]:
@@ -186,13 +168,15 @@ def test_probability_falls_with_strength_and_rises_with_all_measures(
     measures = {name: v[:, None] for name, v in shakings(rng, n).items()}
     p2 = np.exp(rng.uniform(np.log(0.05), np.log(60.0), n))[:, None]
     kr = np.exp(rng.uniform(np.log(0.002), np.log(3.0), n))[:, None]
-    own = {name: measures[name] for name in TERMS[term].inputs}
+    block_inputs = {name: measures[name] for name in TERMS[term].inputs}
     up = 1.0 + np.array([0.0, 0.01, 0.05, 0.3, 1.0])
 
     def steps(kr: np.ndarray, factor: np.ndarray | float) -> np.ndarray:
         # the mean period is that of the same motion, however strong it is
-        given = {name: v * (1.0 if name == "tm_s" else factor) for name, v in own.items()}
-        p = answer_given(model, {"p2": p2, "kr": kr, **given}, 0.95).probability
+        arguments = {
+            name: v * (1.0 if name == "tm_s" else factor) for name, v in block_inputs.items()
+        }
+        p = answer_given(model, {"p2": p2, "kr": kr, **arguments}, 0.95).probability
         middle = (p[:, 1:] > 1e-9) & (p[:, :-1] > 1e-9) & (np.minimum(p[:, 1:], p[:, :-1]) < 0.999)
         assert middle.sum() > 1000
         change = np.diff(p, axis=1)
@@ -202,7 +186,7 @@ def test_probability_falls_with_strength_and_rises_with_all_measures(
     assert (steps(kr * up, 1.0) <= 0.0).all()
     assert (steps(kr, up) >= 0.0).all()
     if term == "pgv_pga_tm":  # a longer period raises P too
-        own["tm_s"] = own["tm_s"] * up
+        block_inputs["tm_s"] = block_inputs["tm_s"] * up
         assert (steps(kr, 1.0) >= 0.0).all()
 
 
@@ -231,7 +215,7 @@ def test_accelerations_in_another_unit_are_doubted() -> None:
 def test_no_shaking_at_one_period(zero: str) -> None:
     model = shipped_form("bounded", "pga_sa03_sa10_sa30")
     measures = {"pga_g": 0.5, "sa03_g": 0.8, "sa10_g": 0.4, "sa30_g": 0.05, zero: 0.0}
-    one = predict(3.0, 0.1, **arguments("", measures), model=model)
+    single = predict(3.0, 0.1, **arguments("", measures), model=model)
     many = predict(np.array([3.0, 3.0]), 0.1, **arguments("", measures), model=model)
-    assert one.probability == pytest.approx(many.probability[0], abs=1e-300)
-    assert 0.0 <= one.probability <= 1.0
+    assert single.probability == pytest.approx(many.probability[0], abs=1e-300)
+    assert 0.0 <= single.probability <= 1.0

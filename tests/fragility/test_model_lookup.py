@@ -9,8 +9,7 @@ from rbfrag.db.engine import opened_database
 from rbfrag.db.location import REFERENCE
 from rbfrag.db.models import load_model, save_model, set_default
 from rbfrag.errors import DatabaseNotFoundError, InputError, ModelError, UnknownModelError
-from rbfrag.fragility.model_list import ModelList
-from rbfrag.fragility.model_selection import SHIPPED, find_model, stored_rows
+from rbfrag.fragility.model_selection import SHIPPED, ModelList, find_model, stored_rows
 from rbfrag.question.question import predict
 
 
@@ -51,10 +50,10 @@ def test_otherwise_the_best_that_the_measures_suffice_for(database, measures, na
 
 def test_terms_of_pgd_answer_by_name_alone(database):
     path = database("pgd_tm", "pga_tm")
-    given = {"pgd_m": 0.1, "tm_s": 0.5, "db": path}
+    inputs = {"pgd_m": 0.1, "tm_s": 0.5, "db": path}
     with pytest.raises(InputError, match=r"give pga_g and tm_s; wls-pgd_tm: by name alone"):
-        predict(3, 0.1, **given)
-    assert predict(3, 0.1, **given, model="wls-pgd_tm").term == "pgd_tm"
+        predict(3, 0.1, **inputs)
+    assert predict(3, 0.1, **inputs, model="wls-pgd_tm").term == "pgd_tm"
 
 
 def test_a_named_model_is_asked_whatever_the_default(database):
@@ -110,15 +109,15 @@ print(sorted(heavy & set(sys.modules)))
     plain = {key: value for key, value in os.environ.items() if key != "RBFRAG_DB"}
     plain["PYTHONPATH"] = os.pathsep.join(p for p in sys.path if p)
     for folder, extra in ((path.parent, {}), (path.parent.parent, {"RBFRAG_DB": str(path)})):
-        done = subprocess.run(
+        process = subprocess.run(
             [sys.executable, "-c", program],
             capture_output=True,
             text=True,
             cwd=folder,
             env={**plain, **extra},
         )
-        assert done.returncode == 0, done.stderr
-        assert done.stdout.split("\n")[:2] == ["wls-pgv", "[]"]
+        assert process.returncode == 0, process.stderr
+        assert process.stdout.split("\n")[:2] == ["wls-pgv", "[]"]
 
 
 def test_the_reference_named_as_a_database_is_no_stopgap(tmp_path, monkeypatch):
@@ -149,11 +148,11 @@ def scored(tmp_path, row):
         path = tmp_path / "scored.db"
         with opened_database(path, create=True) as engine, engine.begin() as connection:
             for term, loss in losses.items():
-                one = row(term)
+                single = row(term)
                 scores = {"scores": {"log_loss_held_out": loss}}
                 save_model(
                     connection,
-                    replace(one, diagnostics={**one.diagnostics, **scores}),
+                    replace(single, diagnostics={**single.diagnostics, **scores}),
                     replace=True,
                 )
             if default is not None:
@@ -181,15 +180,17 @@ def test_the_best_score_answers_unless_another_was_chosen(scored, default, measu
 
 def stored(path, rows):
     with opened_database(path, create=True) as engine, engine.begin() as connection:
-        for each in rows:
-            save_model(connection, each)
+        for row in rows:
+            save_model(connection, row)
     return path
 
 
 def test_a_worse_model_that_is_not_known_here_hides_no_better_one(tmp_path, row):
-    one = row("pgv")
-    better = replace(one, diagnostics={**one.diagnostics, "scores": {"log_loss_held_out": 0.2}})
-    path = stored(tmp_path / "newer.db", [better, replace(one, name="newer", method="oracle")])
+    single = row("pgv")
+    better = replace(
+        single, diagnostics={**single.diagnostics, "scores": {"log_loss_held_out": 0.2}}
+    )
+    path = stored(tmp_path / "newer.db", [better, replace(single, name="newer", method="oracle")])
     assert predict(3.0, 0.1, pgv_m_s=0.6, db=path).model == better.name
     with pytest.raises(ModelError, match="update rbfrag"):
         predict(3.0, 0.1, pgv_m_s=0.6, db=path, model="newer")
@@ -197,19 +198,19 @@ def test_a_worse_model_that_is_not_known_here_hides_no_better_one(tmp_path, row)
 
 def test_of_models_without_scores_the_better_method_answers(tmp_path):
     names = ("wls-pgv", "bounded-pgv_kr")
-    rows = [replace(each, diagnostics={}) for each in stored_rows(REFERENCE) if each.name in names]
+    rows = [replace(item, diagnostics={}) for item in stored_rows(REFERENCE) if item.name in names]
     assert len(rows) == len(names)
-    found = find_model(None, ["p2", "kr", "pgv_m_s"], stored(tmp_path / "unscored.db", rows))
-    assert found.name == "bounded-pgv_kr"
+    result = find_model(None, ["p2", "kr", "pgv_m_s"], stored(tmp_path / "unscored.db", rows))
+    assert result.name == "bounded-pgv_kr"
 
 
 def test_the_score_is_that_of_real_blocks_where_there_is_one(scored, tmp_path, row):
     path = scored({"pgv": 0.20, "pga_tm": 0.15})
-    one = row("pgv")
+    single = row("pgv")
     scores = {"log_loss_held_out": 0.20, "log_loss_held_out_kr05": 0.10}
     with opened_database(path) as engine, engine.begin() as connection:
         save_model(
-            connection, replace(one, diagnostics={**one.diagnostics, "scores": scores}),
+            connection, replace(single, diagnostics={**single.diagnostics, "scores": scores}),
             replace=True,
         )  # fmt: skip
     assert find_model(None, ["pgv_m_s", "pga_g", "tm_s"], path).name == "wls-pgv"
@@ -229,3 +230,12 @@ def test_the_number_of_a_model_without_critical_values_is_that_of_its_outcomes()
     assert rocking["n"] == 0
     assert listed["rocking-pgv_pga"] == rocking["n_outcomes"]
     assert listed["bounded-pgv_pga"] == toppling["n"] < toppling["n_outcomes"]
+
+
+def test_a_model_of_another_form_is_rejected(row, tmp_path):
+    file = tmp_path / "old.db"
+    with opened_database(file, create=True) as engine, engine.begin() as connection:
+        save_model(connection, replace(row(), form=1))
+    for named in (None, "wls-pgv"):
+        with pytest.raises(ModelError, match="fitted by another version of rbfrag: fit it again"):
+            predict(3.0, 0.1, pgv_m_s=0.6, db=file, model=named)

@@ -53,9 +53,9 @@ def questions(model: FragilityModel, seed: int = 5) -> dict[str, FloatArray]:
     return {name: values[name] for name in (*model.method.block.names, *model.term.inputs)}
 
 
-def p_of(model: FragilityModel, given: dict[str, FloatArray]) -> FloatArray:
+def p_of(model: FragilityModel, inputs: dict[str, FloatArray]) -> FloatArray:
     """Return P, shape (n, steps)."""
-    arrays = dict(zip(given, np.broadcast_arrays(*given.values()), strict=True))
+    arrays = dict(zip(inputs, np.broadcast_arrays(*inputs.values()), strict=True))
     shape = next(iter(arrays.values())).shape
     flat = {name: value.ravel() for name, value in arrays.items()}
     answer: Any = answer_given(model, flat, 0.95, interval=False)
@@ -63,27 +63,27 @@ def p_of(model: FragilityModel, given: dict[str, FloatArray]) -> FloatArray:
 
 
 def test_it_rises_with_all_measures_together(model: FragilityModel) -> None:
-    given = questions(model)
+    arguments = questions(model)
     factor = np.geomspace(1e-4, 100.0, STEPS)
     for name in model.term.inputs:
         if name not in FIXED:
-            given[name] = given[name] * factor ** (2.0 if name == "arias_m_s" else 1.0)
-    p = p_of(model, given)
+            arguments[name] = arguments[name] * factor ** (2.0 if name == "arias_m_s" else 1.0)
+    p = p_of(model, arguments)
     assert np.diff(p, axis=1).min() >= -ROUNDING
     assert p[:, 0].max() < 1e-3
     assert np.median(p[:, -1]) > 0.7
 
 
 def test_it_falls_with_strength(model: FragilityModel) -> None:
-    given = questions(model)
+    inputs = questions(model)
     name = model.method.block.strength
-    given[name] = np.geomspace(*KR, STEPS)[None, :]
-    assert np.diff(p_of(model, given), axis=1).max() <= ROUNDING
+    inputs[name] = np.geomspace(*KR, STEPS)[None, :]
+    assert np.diff(p_of(model, inputs), axis=1).max() <= ROUNDING
 
 
 @pytest.mark.parametrize("name", [row.name for row in ROWS if row.kind == "sliding"])
 def test_it_falls_with_displacement(name: str) -> None:
     model = FragilityModel.from_row(next(row for row in ROWS if row.name == name))
-    given = questions(model)
-    given["displacement_m"] = np.geomspace(1e-3, 10.0, STEPS)[None, :]
-    assert np.diff(p_of(model, given), axis=1).max() <= ROUNDING
+    inputs = questions(model)
+    inputs["displacement_m"] = np.geomspace(1e-3, 10.0, STEPS)[None, :]
+    assert np.diff(p_of(model, inputs), axis=1).max() <= ROUNDING

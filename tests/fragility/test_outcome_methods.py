@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 from rbfrag.errors import FitError, InputError
-from rbfrag.fragility.fit import outcomes as outcome_method
-from rbfrag.fragility.fit.clusters import cr3, jackknife_steps
+from rbfrag.fragility.fit import maximum_likelihood
 from rbfrag.fragility.fit.data import FitSource, fit_data
 from rbfrag.fragility.fit.fitting import fit, fit_source
 from rbfrag.fragility.fit.likelihood import most_likely
-from rbfrag.fragility.fit.outcomes import outcome_rows, parameter_names
+from rbfrag.fragility.fit.maximum_likelihood import outcome_rows, parameter_names
 from rbfrag.fragility.fit.report import FitReport
+from rbfrag.fragility.fit.result import cr3, jackknife_steps
 from rbfrag.fragility.measures import TERMS
 from rbfrag.fragility.method import SINGLE
 from rbfrag.fragility.methods import method_named
@@ -22,7 +22,7 @@ from tests.fragility.outcome_draws import TRUTH, drawn_outcomes
 
 @pytest.fixture(autouse=True)
 def few_replicates(monkeypatch):
-    monkeypatch.setattr(outcome_method, "REPLICATES", 20)
+    monkeypatch.setattr(maximum_likelihood, "OUTCOME_REPLICATES", 20)
 
 
 def rows_of(source, method, term):
@@ -68,16 +68,16 @@ def test_the_report_holds_what_it_promises():
 
 
 def test_errors_grow_with_what_earthquakes_share():
-    found = []
+    values = []
     for shared in (0.0, 0.3):
         source = drawn_outcomes("logistic", "pgv", TRUTH["logistic", "pgv"], shared=shared)
-        report = fit(source, term="pgv", method="logistic")
+        report = fit(source, term="pgv", method="logistic", bootstrap=True)
         naive = report.details["naive_standard_errors"]["b0"]
-        found.append(report.standard_errors["b0"] / naive)
+        values.append(report.standard_errors["b0"] / naive)
         boot = report.details["bootstrap"]["standard_errors"]["b0"]
         assert boot == pytest.approx(report.standard_errors["b0"], rel=0.6)
-    assert 0.6 < found[0] < 1.6
-    assert found[1] > 1.5 * found[0]
+    assert 0.6 < values[0] < 1.6
+    assert values[1] > 1.5 * values[0]
 
 
 def test_held_out_probabilities_are_those_of_separate_fits():
@@ -85,13 +85,13 @@ def test_held_out_probabilities_are_those_of_separate_fits():
     record = method_named("record")
     fitted = fit_source(source, TERMS["xp"], record)
     data = fitted.data
-    own = data.event == 3
+    reference = data.event == 3
     names = [data.event_names[i] for i in data.event]
-    others = source.only(source.table.event_id != names[int(np.argmax(own))])
+    alternatives = source.only(source.table.event_id != names[int(np.argmax(reference))])
     names_of_fit = parameter_names(record, TERMS["xp"])
-    rest = fit_data(others, record, TERMS["xp"])
+    rest = fit_data(alternatives, record, TERMS["xp"])
     b = most_likely(outcome_rows(rest, record, TERMS["xp"], names_of_fit).data)
-    i = int(np.flatnonzero(own)[0])
+    i = int(np.flatnonzero(reference)[0])
     for j in np.flatnonzero(data.read[i])[::5]:
         values = {name: float(data.grid(name)[i, j]) for name in data.blocks}
         form = record.forms["xp"]
@@ -109,8 +109,8 @@ def test_unknown_outcomes_are_left_out():
     failed[::2, :5] = np.nan
     data = fit_data(replace(source, failed=failed), method_named("logistic"), TERMS["pgv"])
     rows = rows_of(replace(source, failed=failed), "logistic", "pgv")
-    known = data.read & np.isfinite(data.failed)
-    assert rows.data.weights.sum() == known.sum() < data.read.sum()
+    expected = data.read & np.isfinite(data.failed)
+    assert rows.data.weights.sum() == expected.sum() < data.read.sum()
     assert set(rows.data.weights.tolist()) == {0.0, 1.0}
 
 
@@ -149,7 +149,7 @@ def test_fits_read_blocks_as_rock_has_them_and_are_judged_on_the_grid():
     assert (rows.data.weights[unread] == 0.0).all()
     b = most_likely(rows.data)
     assert b == pytest.approx(most_likely(rows.data.only(~unread)), rel=1e-9)
-    scores = fit_source(wider, TERMS["pgv"], method_named("logistic"), shared=False).report.scores
+    scores = fit_source(wider, TERMS["pgv"], method_named("logistic")).report.scores
     assert scores["log_loss_held_out_kr05"] != scores["log_loss_held_out"]
 
 

@@ -83,19 +83,21 @@ def test_stronger_shaking_and_weaker_blocks_topple_no_less(name, p2, kr, pgv, ra
     assert harder.probability >= base.probability - 1e-15
 
 
-def predict_known(model, p2, kr, known):
-    if "xp_m_s" not in known:
-        return predict(p2, kr, **known, model=model)
-    return answer_given(model, {"p2": p2, "kr": kr, **known}, 0.95)
+def predict_known(model, p2, kr, expected):
+    if "xp_m_s" not in expected:
+        return predict(p2, kr, **expected, model=model)
+    return answer_given(model, {"p2": p2, "kr": kr, **expected}, 0.95)
 
 
 @pytest.mark.parametrize("name", MODELS)
 def test_limits(name):
     model = MODELS[name]
-    known = measures(model, 0.5, 0.5, 0.5, 0.4)
-    assert predict_known(model, 3.0, 1e-9, known).probability == pytest.approx(1.0, abs=1e-6)
-    assert predict_known(model, 3.0, 100.0, known).probability < 1e-3
-    nothing = predict_known(model, 3.0, 0.1, {key: 0.0 if key != "tm_s" else 0.5 for key in known})
+    expected = measures(model, 0.5, 0.5, 0.5, 0.4)
+    assert predict_known(model, 3.0, 1e-9, expected).probability == pytest.approx(1.0, abs=1e-6)
+    assert predict_known(model, 3.0, 100.0, expected).probability < 1e-3
+    nothing = predict_known(
+        model, 3.0, 0.1, {key: 0.0 if key != "tm_s" else 0.5 for key in expected}
+    )
     assert (nothing.probability, nothing.ci_high) == (0.0, 0.0)
 
 
@@ -110,22 +112,22 @@ def test_limits(name):
 )
 def test_mechanics_is_stated(name, kr, words):
     model = MODELS[name]
-    known = measures(model, 0.5, 0.5, 0.5, 0.8)
-    answer = predict_known(model, 3.0, kr * (10 if name == "bounded-pgv_kr" else 1), known)
+    expected = measures(model, 0.5, 0.5, 0.5, 0.8)
+    answer = predict_known(model, 3.0, kr * (10 if name == "bounded-pgv_kr" else 1), expected)
     if name == "record-xp":
-        answer = predict_known(model, 3.0, 0.2, known)
+        answer = predict_known(model, 3.0, 0.2, expected)
     assert (answer.probability, answer.ci_low, answer.ci_high) == (0.0, 0.0, 0.0)
     assert words in answer.warnings[0]
     assert answer.in_domain
     assert answer.how == ("by the spectrum bound" if name == "record-xp" else "by mechanics")
-    assert predict_known(model, 3.0, 0.05, known).how == f"model {name}"
+    assert predict_known(model, 3.0, 0.05, expected).how == f"model {name}"
 
 
 def test_the_gate_does_not_act_with_vertical_motion():
     with_vertical = model_of("logistic", "pgv", vertical="with")
-    known = {"pgv_m_s": 2.0, "pga_g": 0.2}
-    assert predict(30.0, 0.25, **known, model=with_vertical).probability > 0.1
-    assert predict(30.0, 0.25, **known, model=MODELS["logistic-pgv"]).probability == 0.0
+    expected = {"pgv_m_s": 2.0, "pga_g": 0.2}
+    assert predict(30.0, 0.25, **expected, model=with_vertical).probability > 0.1
+    assert predict(30.0, 0.25, **expected, model=MODELS["logistic-pgv"]).probability == 0.0
 
 
 @pytest.mark.parametrize("name", MODELS)
@@ -134,7 +136,7 @@ def test_arrays_agree_with_scalars(name):
     random = np.random.default_rng(4)
     n = 300
     pgv = np.exp(random.uniform(-6, 1.5, n))
-    known = measures(
+    expected = measures(
         model,
         pgv,
         pgv / np.exp(random.normal(0, 1, n)),
@@ -142,30 +144,30 @@ def test_arrays_agree_with_scalars(name):
         pgv * random.uniform(0.3, 1.0, n),
     )
     columns = {"p2": np.exp(random.uniform(-4, 5, n)), "kr": np.exp(random.uniform(-9, 1, n))}
-    columns = {**columns, **known}
+    columns = {**columns, **expected}
     many = answer_given(model, columns, 0.9)
     for i in range(n):
-        one = answer_given(model, {key: float(c[i]) for key, c in columns.items()}, 0.9)
+        single = answer_given(model, {key: float(c[i]) for key, c in columns.items()}, 0.9)
         assert [
             many.probability[i], many.ci_low[i], many.ci_high[i], many.y_m_s[i],
             many.intensity_m_s[i],
         ] == pytest.approx(
-            [one.probability, one.ci_low, one.ci_high, one.y_m_s, one.intensity_m_s],
+            [single.probability, single.ci_low, single.ci_high, single.y_m_s, single.intensity_m_s],
             rel=1e-12, abs=1e-250,
         )  # fmt: skip
-        assert one.in_domain == many.in_domain[i]
-        assert len(one.warnings) == len([r for r in many.reason[i].split("; ") if r])
+        assert single.in_domain == many.in_domain[i]
+        assert len(single.warnings) == len([r for r in many.reason[i].split("; ") if r])
 
 
 def test_many_chunks_are_one_answer(monkeypatch):
     model = MODELS["bounded-pgv_pga"]
     random = np.random.default_rng(0)
     kr = np.exp(random.uniform(-4, 0, 1000))
-    whole = predict(3.0, kr, pgv_m_s=0.5, pga_g=0.4, model=model)
+    complete = predict(3.0, kr, pgv_m_s=0.5, pga_g=0.4, model=model)
     monkeypatch.setattr(prediction_array, "CHUNK", 64)
     parts = predict(3.0, kr.reshape(20, 50), pgv_m_s=0.5, pga_g=0.4, model=model)
-    assert parts.probability.ravel().tolist() == whole.probability.tolist()
-    assert parts.reason.ravel().tolist() == whole.reason.tolist()
+    assert parts.probability.ravel().tolist() == complete.probability.tolist()
+    assert parts.reason.ravel().tolist() == complete.reason.tolist()
     kr[-1] = np.nan
     with pytest.raises(InputError, match=r"element \(19, 49\): kr = nan"):
         predict(3.0, kr.reshape(20, 50), pgv_m_s=0.5, pga_g=0.4, model=model, nan="raise")
@@ -181,14 +183,14 @@ def test_a_motion_is_answered_by_its_spectrum():
     model, motion = MODELS["record-xp"], shaking()
     both = predict(3.0, 0.05, motion=motion, model=model)
     assert isinstance(both, MotionPrediction)
-    for name, one in (("forward", both.forward), ("reverse", both.reverse)):
+    for name, item in (("forward", both.forward), ("reverse", both.reverse)):
         x = toppling_spectrum(motion, 3.0, name)
-        assert one.intensity_m_s == x
-        eta = 4.1 + 3.2 * math.log(x / one.y_m_s)
+        assert item.intensity_m_s == x
+        eta = 4.1 + 3.2 * math.log(x / item.y_m_s)
         eta += 1.3 * math.log(math.sqrt(3.0) * x / (motion.pga_g * G))
         eta *= math.sqrt(3.0) ** 0.18
-        assert one.probability == pytest.approx(1 / (1 + math.exp(-eta)), rel=1e-9)
-        assert predict(3.0, 0.05, motion=motion, polarity=name, model=model) == one
+        assert item.probability == pytest.approx(1 / (1 + math.exp(-eta)), rel=1e-9)
+        assert predict(3.0, 0.05, motion=motion, polarity=name, model=model) == item
     assert both.probability == 0.5 * (both.forward.probability + both.reverse.probability)
     assert set(both.as_dict()["polarities"]) == {"forward", "reverse"}
 

@@ -44,8 +44,8 @@ def stored(term: str, b: tuple[float, ...], **changes: Any) -> FragilityModel:
     return FragilityModel.from_row(ModelRow(**{**values, **changes}))
 
 
-def one(model: FragilityModel, **given: float) -> Prediction:
-    answer = answer_given(model, given, 0.95)
+def predict_block(model: FragilityModel, **inputs: float) -> Prediction:
+    answer = answer_given(model, inputs, 0.95)
     assert isinstance(answer, Prediction)
     return answer
 
@@ -73,7 +73,7 @@ def test_the_form_with_spectral_accelerations() -> None:
     )  # fmt: skip
     eta = sum(b * x for b, x in zip(SPECTRAL, terms, strict=True))
     eta *= math.exp(0.15 * l - 0.08 * l * l)
-    answer = one(
+    answer = predict_block(
         stored("pgv_pga_sa10_sa30", SPECTRAL), p2=p2, kr=kr, restitution=e, pgv_m_s=pgv, pga_g=pga,
         sa10_g=sa10, sa30_g=sa30,
     )  # fmt: skip
@@ -83,12 +83,12 @@ def test_the_form_with_spectral_accelerations() -> None:
 def test_only_magnitudes_below_6_5_make_a_difference() -> None:
     model = stored("pga_m", (-1.7, -1.0, 3.4, -4.5, -1.9, 2.4, -0.34, -0.6))
     p = [
-        one(model, p2=3.0, kr=0.1, pga_g=0.4, magnitude=m).probability
+        predict_block(model, p2=3.0, kr=0.1, pga_g=0.4, magnitude=m).probability
         for m in (5.0, 6.0, 6.5, 7.0, 8.0)
     ]
     assert p[0] < p[1] < p[2] == p[3] == p[4]
     assert "say little of overturning" in " ".join(
-        one(model, p2=3.0, kr=0.1, pga_g=0.4, magnitude=7.0).warnings
+        predict_block(model, p2=3.0, kr=0.1, pga_g=0.4, magnitude=7.0).warnings
     )
 
 
@@ -98,7 +98,7 @@ def test_restitution_is_that_of_the_rectangle_unless_it_is_given(e: float | None
     p2, kr, pgv, pga = 3.0, 0.2, 0.6, 0.5
     block = {"p2": p2, "kr": kr} | ({} if e is None else {"restitution": e})
     housner = 1.0 - 1.5 * math.sin(math.atan(kr)) ** 2
-    answer = one(model, **block, pgv_m_s=pgv, pga_g=pga)
+    answer = predict_block(model, **block, pgv_m_s=pgv, pga_g=pga)
     expected = five_terms(p2, kr, housner if e is None else e, pgv, pga)
     assert answer.probability == pytest.approx(expected, rel=1e-12)
     assert (answer.kind, answer.failure) == ("rocking", "overturning")
@@ -112,13 +112,13 @@ def test_restitution_is_that_of_the_rectangle_unless_it_is_given(e: float | None
 def test_a_block_that_the_ground_cannot_lift_cannot_overturn() -> None:
     for term, b in (("pgv_pga", T2), ("pgv", PGV)):
         model = stored(term, b)
-        answer = one(model, p2=3.0, kr=0.5, pgv_m_s=2.0, pga_g=0.5)
+        answer = predict_block(model, p2=3.0, kr=0.5, pgv_m_s=2.0, pga_g=0.5)
         assert answer.probability == answer.ci_high == 0.0
         assert any("the block cannot uplift" in text for text in answer.warnings)
-        weaker = one(model, p2=3.0, kr=0.49, pgv_m_s=2.0, pga_g=0.5)
+        weaker = predict_block(model, p2=3.0, kr=0.49, pgv_m_s=2.0, pga_g=0.5)
         assert weaker.probability > 0.0
         assert not any("the block cannot uplift" in text for text in weaker.warnings)
-        safe = one(model, p2=3.0, kr=0.49, pgv_m_s=1e-3, pga_g=0.5)
+        safe = predict_block(model, p2=3.0, kr=0.49, pgv_m_s=1e-3, pga_g=0.5)
         assert 0.0 < safe.probability < 1e-3
         assert not any("the block cannot uplift" in text for text in safe.warnings)
 
@@ -127,9 +127,9 @@ def test_a_block_that_the_ground_cannot_lift_cannot_overturn() -> None:
 def test_restitution_is_above_zero_and_up_to_one(e: float) -> None:
     model = stored("pgv_pga", T2)
     with pytest.raises(InputError, match="restitution = "):
-        one(model, p2=3.0, kr=0.2, restitution=e, pgv_m_s=0.6, pga_g=0.5)
-    given = {"p2": 3.0, "kr": 0.2, "restitution": np.array([e, 0.9]), "pgv_m_s": 0.6, "pga_g": 0.5}
-    many = answer_given(model, given, 0.95)
+        predict_block(model, p2=3.0, kr=0.2, restitution=e, pgv_m_s=0.6, pga_g=0.5)
+    inputs = {"p2": 3.0, "kr": 0.2, "restitution": np.array([e, 0.9]), "pgv_m_s": 0.6, "pga_g": 0.5}
+    many = answer_given(model, inputs, 0.95)
     assert isinstance(many, PredictionArray)
     assert np.isnan(many.probability).tolist() == [True, False]
     assert "restitution" in many.reason[0]
@@ -137,14 +137,14 @@ def test_restitution_is_above_zero_and_up_to_one(e: float) -> None:
 
 def test_restitution_that_was_not_fitted_is_outside_the_domain() -> None:
     model = stored("pgv_pga", T2)
-    given = one(model, p2=3.0, kr=0.2, restitution=0.5, pgv_m_s=0.6, pga_g=0.5)
+    inputs = predict_block(model, p2=3.0, kr=0.2, restitution=0.5, pgv_m_s=0.6, pga_g=0.5)
     # a stocky block: its formula gives less than 0.6
-    stocky = one(model, p2=3.0, kr=0.7, pgv_m_s=2.0, pga_g=1.5)
-    for answer in (given, stocky):
+    stocky = predict_block(model, p2=3.0, kr=0.7, pgv_m_s=2.0, pga_g=1.5)
+    for answer in (inputs, stocky):
         assert not answer.in_domain
         assert any("restitution = " in text for text in answer.warnings)
     # so stocky that the formula is below zero: as if no speed were left
-    assert 0.0 < one(model, p2=3.0, kr=2.0, pgv_m_s=5.0, pga_g=2.1).probability < 1.0
+    assert 0.0 < predict_block(model, p2=3.0, kr=2.0, pgv_m_s=5.0, pga_g=2.1).probability < 1.0
 
 
 def test_less_restitution_less_shaking_and_more_strength_are_safer() -> None:
@@ -156,7 +156,9 @@ def test_less_restitution_less_shaking_and_more_strength_are_safer() -> None:
     for model in models:
 
         def p(model: FragilityModel = model, **changes: float) -> float:
-            return one(model, **{**block, "pgv_m_s": 0.5, "pga_g": 0.5, **changes}).probability
+            return predict_block(
+                model, **{**block, "pgv_m_s": 0.5, "pga_g": 0.5, **changes}
+            ).probability
 
         assert p(restitution=0.8) < p() < p(restitution=1.0)
         assert p(kr=0.25) < p() < p(kr=0.15)
@@ -183,7 +185,7 @@ def test_pga_alone_is_rejected_and_told_what_would_suffice(tmp_path: Path) -> No
     chosen = find_model(None, most, path, kind="rocking")
     assert chosen.term.name == "pgv_pga"
     assert unused_measures(chosen, most) == (
-        "magnitude was not used: model rocking-pgv_pga reads pgv_m_s and pga_g",
+        "magnitude was not used: model rocking-pgv_pga uses pgv_m_s and pga_g",
     )
 
 

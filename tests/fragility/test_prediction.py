@@ -61,7 +61,7 @@ def test_keys_of_the_json_contract(row):
         "kind", "mode", "probability", "ci_low", "ci_high", "event_low", "event_high", "level",
         "model", "term", "method", "failure", "y_m_s", "intensity_m_s", "in_domain", "warnings",
         "pgv_over_pga_s", "median_displacement_m", "block_sd", "data", "shaking", "how",
-        "drained",
+        "drained", "uncertainty", "as_stated", "sensitivity", "solution",
     ]  # fmt: skip
     assert (answer.kind, answer.failure, answer.median_displacement_m) == (
         "toppling", "toppling", None,
@@ -137,31 +137,33 @@ def test_arrays_agree_with_scalars(row, term):
     assert tails.size > 5
     for i in range(2000):
         numbers = {k: float(c[i]) for k, c in columns.items()}
-        one = predict(**numbers, model=row(term), component="single")
-        assert isinstance(one, Prediction)
+        single = predict(**numbers, model=row(term), component="single")
+        assert isinstance(single, Prediction)
         assert [many.probability[i], many.ci_low[i], many.ci_high[i]] == pytest.approx(
-            [one.probability, one.ci_low, one.ci_high], rel=1e-12, abs=1e-250
+            [single.probability, single.ci_low, single.ci_high], rel=1e-12, abs=1e-250
         )
-        assert one.in_domain == many.in_domain[i]
+        assert single.in_domain == many.in_domain[i]
         of_all = ("was not used", "Check the unit")
-        own = [text for text in one.warnings if not any(words in text for words in of_all)]
-        assert len(own) == len([r for r in many.reason[i].split("; ") if r])
+        expected = [text for text in single.warnings if not any(words in text for words in of_all)]
+        assert len(expected) == len([r for r in many.reason[i].split("; ") if r])
 
 
 def test_measures_that_the_model_does_not_read_are_named(row):
     single = predict(3.0, 0.1, pgv_m_s=0.6, tm_s=0.5, model=row())
-    said = f"tm_s was not used: model {single.model} reads pgv_m_s"
-    assert said in single.warnings
-    assert said in predict([3.0, 4.0], 0.1, pgv_m_s=0.6, tm_s=0.5, model=row()).warnings
-    assert said in predict(height_m=2.0, width_m=0.4, pgv_m_s=0.6, tm_s=0.5, model=row()).warnings
-    assert not any("not used" in each for each in predict(3.0, 0.1, pgv_m_s=0.6).warnings)
+    message = f"tm_s was not used: model {single.model} uses pgv_m_s"
+    assert message in single.warnings
+    assert message in predict([3.0, 4.0], 0.1, pgv_m_s=0.6, tm_s=0.5, model=row()).warnings
+    assert (
+        message in predict(height_m=2.0, width_m=0.4, pgv_m_s=0.6, tm_s=0.5, model=row()).warnings
+    )
+    assert not any("not used" in warning for warning in predict(3.0, 0.1, pgv_m_s=0.6).warnings)
 
 
 @pytest.mark.parametrize("kr", [0.0, -0.1])
 def test_what_falls_without_shaking_has_p_1_alone_and_in_arrays(row, kr):
-    one = predict(3.0, kr, pgv_m_s=0.6, model=row())
-    assert (one.probability, one.ci_low, one.ci_high) == (1.0, 1.0, 1.0)
-    assert any("unstable without shaking" in text for text in one.warnings)
+    single = predict(3.0, kr, pgv_m_s=0.6, model=row())
+    assert (single.probability, single.ci_low, single.ci_high) == (1.0, 1.0, 1.0)
+    assert any("unstable without shaking" in text for text in single.warnings)
     many = predict(3.0, np.array([kr, 0.1]), pgv_m_s=0.6, model=row())
     assert many.probability[0] == 1.0
     assert many.probability[1] < 1.0
@@ -169,10 +171,10 @@ def test_what_falls_without_shaking_has_p_1_alone_and_in_arrays(row, kr):
 
 def test_an_interval_may_be_left_out(row):
     kr = np.array([0.1, 0.2, np.nan, -1.0])
-    whole = predict(3.0, kr, pgv_m_s=0.6, model=row())
+    complete = predict(3.0, kr, pgv_m_s=0.6, model=row())
     alone = predict(3.0, kr, pgv_m_s=0.6, model=row(), interval=False)
-    assert np.array_equal(alone.probability, whole.probability, equal_nan=True)
-    assert np.array_equal(alone.reason, whole.reason)
+    assert np.array_equal(alone.probability, complete.probability, equal_nan=True)
+    assert np.array_equal(alone.reason, complete.reason)
     assert np.isnan(alone.ci_low).all()
     assert np.isnan(alone.ci_high).all()
 
@@ -181,16 +183,16 @@ def test_broadcast_shapes(row):
     answer = predict(np.ones((3, 1, 1)), np.full((4, 1), 0.1), pgv_m_s=[0.1, 0.2], model=row())
     for name in ("probability", "ci_low", "ci_high", "in_domain", "reason", "y_m_s"):
         assert getattr(answer, name).shape == (3, 4, 2)
-    one = predict(1, 0.1, pgv_m_s=0.2, model=row()).probability
-    assert answer.probability[0, 0, 1] == pytest.approx(one, rel=1e-12)
+    single = predict(1, 0.1, pgv_m_s=0.2, model=row()).probability
+    assert answer.probability[0, 0, 1] == pytest.approx(single, rel=1e-12)
     assert predict([], 0.1, pgv_m_s=0.2, model=row()).probability.shape == (0,)
     with pytest.raises(InputError, match=r"p2 \(3,\).*kr \(2,\)"):
         predict(np.ones(3), np.ones(2), pgv_m_s=0.1, model=row())
 
 
-@pytest.mark.parametrize("one", [np.float32(3), np.int64(3), np.array(3.0), 3])
-def test_single_numbers_of_any_kind_answer_a_prediction(row, one):
-    assert predict(one, 0.1, pgv_m_s=0.6, model=row()) == predict(
+@pytest.mark.parametrize("first", [np.float32(3), np.int64(3), np.array(3.0), 3])
+def test_single_numbers_of_any_kind_answer_a_prediction(row, first):
+    assert predict(first, 0.1, pgv_m_s=0.6, model=row()) == predict(
         3.0, 0.1, pgv_m_s=0.6, model=row()
     )
 
@@ -367,6 +369,6 @@ assert 0 < predict(3, 0.1, pgv_m_s=0.6, model=row).probability < 1
 heavy = {"numpy", "scipy", "pandas", "statsmodels", "numba", "matplotlib", "sqlalchemy"}
 print(sorted(heavy & set(sys.modules)))
 """
-    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr
-    assert done.stdout.strip() == "[]"
+    process = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
+    assert process.returncode == 0, process.stderr
+    assert process.stdout.strip() == "[]"

@@ -52,8 +52,8 @@ SLIDE = {"ky": 0.1, "displacement_m": 0.1}
 SLUMP = {"ks": 0.15, "ps2": 3.0}
 
 
-def one(**asked: Any) -> Prediction:
-    answer = predict(**asked)
+def predict_block(**inputs: Any) -> Prediction:
+    answer = predict(**inputs)
     assert isinstance(answer, Prediction)
     return answer
 
@@ -68,33 +68,33 @@ def one(**asked: Any) -> Prediction:
 def test_probabilities_fall_with_strength_and_distance(
     ky: float, d: float, pgv: float, pga: float
 ) -> None:
-    asked: dict[str, Any] = {"ky": ky, "pgv_m_s": pgv, "pga_g": pga, "model": row_of("sliding")}
-    here = one(displacement_m=d, **asked)
-    assert 0.0 <= here.ci_low <= here.probability <= here.ci_high <= 1.0
-    further = one(displacement_m=1.5 * d, **asked)
-    assert further.probability <= here.probability
+    inputs: dict[str, Any] = {"ky": ky, "pgv_m_s": pgv, "pga_g": pga, "model": row_of("sliding")}
+    local = predict_block(displacement_m=d, **inputs)
+    assert 0.0 <= local.ci_low <= local.probability <= local.ci_high <= 1.0
+    further = predict_block(displacement_m=1.5 * d, **inputs)
+    assert further.probability <= local.probability
     if ky >= pga:
-        assert here.probability == here.ci_high == 0.0
-        assert any("does not move" in text for text in here.warnings)
-        assert here.median_displacement_m is None
+        assert local.probability == local.ci_high == 0.0
+        assert any("does not move" in text for text in local.warnings)
+        assert local.median_displacement_m is None
     else:
-        assert here.median_displacement_m is not None
+        assert local.median_displacement_m is not None
         # what is exceeded with P = 1/2 splits the distances
-        assert (d < here.median_displacement_m) == (here.probability > 0.5)
+        assert (d < local.median_displacement_m) == (local.probability > 0.5)
 
 
 def test_a_base_that_dips_is_a_shorter_distance_on_a_level_one() -> None:
-    asked: dict[str, Any] = {"pgv_m_s": 0.5, "pga_g": 0.6, "model": row_of("sliding")}
+    inputs: dict[str, Any] = {"pgv_m_s": 0.5, "pga_g": 0.6, "model": row_of("sliding")}
     factor = math.cos(math.atan(0.1)) / math.cos(math.radians(25.0) + math.atan(0.1))
-    inclined = one(ky=0.1, displacement_m=0.2, beta_deg=25.0, **asked)
-    level = one(ky=0.1, displacement_m=0.2 / factor, **asked)
+    inclined = predict_block(ky=0.1, displacement_m=0.2, beta_deg=25.0, **inputs)
+    level = predict_block(ky=0.1, displacement_m=0.2 / factor, **inputs)
     assert inclined.probability == pytest.approx(level.probability, rel=1e-12)
     assert inclined.failure == "permanent displacement above 0.2 m"
     assert inclined.median_displacement_m == pytest.approx(factor * level.median_displacement_m)
     for beta in (88.0, 95.0, -10.0):
         with pytest.raises(InputError, match="friction angle"):
-            predict(ky=0.1, displacement_m=0.2, beta_deg=beta, **asked)
-    many = predict(ky=0.1, displacement_m=0.2, beta_deg=[25.0, 88.0, -5.0], **asked)
+            predict(ky=0.1, displacement_m=0.2, beta_deg=beta, **inputs)
+    many = predict(ky=0.1, displacement_m=0.2, beta_deg=[25.0, 88.0, -5.0], **inputs)
     assert isinstance(many, PredictionArray)
     assert many.probability[0] == pytest.approx(inclined.probability, rel=1e-12)
     assert np.isnan(many.probability).tolist() == [False, True, False]
@@ -104,21 +104,21 @@ def test_a_base_that_dips_is_a_shorter_distance_on_a_level_one() -> None:
 def test_a_slump_is_answered_by_its_formula() -> None:
     ks, ps2, pgv, pga = 0.15, 3.0, 0.5, 0.6
     b0, b1, b2, b3, bm = SLUMPS
-    asked: dict[str, Any] = {"ks": ks, "ps2": ps2, "pgv_m_s": pgv}
-    found = one(**asked, pga_g=pga, model=row_of("slumping"))
+    inputs: dict[str, Any] = {"ks": ks, "ps2": ps2, "pgv_m_s": pgv}
+    result = predict_block(**inputs, pga_g=pga, model=row_of("slumping"))
     r = ks / pga
     z = math.sqrt(ps2) * pgv / (pga * STANDARD_GRAVITY_M_S2)
     eta = b0 + b1 * math.log((1 - r) / r) + b2 * math.log(z) + b3 * math.log(ks)
-    assert found.probability == pytest.approx(float(ndtr(eta)), rel=1e-12)
-    assert found.y_m_s == pytest.approx(ks * STANDARD_GRAVITY_M_S2 / math.sqrt(ps2))
-    assert (found.in_domain, found.kind, found.failure) == (
+    assert result.probability == pytest.approx(float(ndtr(eta)), rel=1e-12)
+    assert result.y_m_s == pytest.approx(ks * STANDARD_GRAVITY_M_S2 / math.sqrt(ps2))
+    assert (result.in_domain, result.kind, result.failure) == (
         True, "slumping", "failure past recovery",
     )  # fmt: skip
-    great = one(**asked, pga_g=pga, magnitude=7.5, model=row_of("slumping", "pgv_pga_m"))
+    great = predict_block(**inputs, pga_g=pga, magnitude=7.5, model=row_of("slumping", "pgv_pga_m"))
     assert great.probability == pytest.approx(float(ndtr(eta + bm)), rel=1e-12)
-    still = one(ks=0.7, ps2=ps2, pgv_m_s=pgv, pga_g=pga, model=row_of("slumping"))
+    still = predict_block(ks=0.7, ps2=ps2, pgv_m_s=pgv, pga_g=pga, model=row_of("slumping"))
     assert still.probability == 0.0
-    far = one(ks=ks, ps2=ps2, pgv_m_s=5.0, pga_g=pga, model=row_of("slumping"))
+    far = predict_block(ks=ks, ps2=ps2, pgv_m_s=5.0, pga_g=pga, model=row_of("slumping"))
     assert not far.in_domain
     assert any("PGV/(PGA·g) is" in text for text in far.warnings)
 
@@ -126,17 +126,17 @@ def test_a_slump_is_answered_by_its_formula() -> None:
 def test_the_same_warnings_and_types_as_for_toppling() -> None:
     for block, kind in ((SLIDE, "sliding"), (SLUMP, "slumping")):
         model = row_of(kind)
-        large = one(**block, pgv_m_s=60.0, pga_g=0.5, model=model)
+        large = predict_block(**block, pgv_m_s=60.0, pga_g=0.5, model=model)
         assert any("did you mean cm/s" in text for text in large.warnings)
-        nothing = one(**block, pgv_m_s=0.0, pga_g=0.0, model=model)
+        nothing = predict_block(**block, pgv_m_s=0.0, pga_g=0.0, model=model)
         assert (nothing.probability, nothing.ci_high) == (0.0, 0.0)
         assert any("no shaking" in text for text in nothing.warnings)
-        plain = one(**block, pgv_m_s=0.5, pga_g=0.5, model=model)
+        plain = predict_block(**block, pgv_m_s=0.5, pga_g=0.5, model=model)
         for number in (np.float32, np.float64, np.array):
             half = {name: number(value) for name, value in block.items()}
-            assert one(**half, pgv_m_s=0.5, pga_g=0.5, model=model).probability == pytest.approx(
-                plain.probability, rel=1e-5
-            )
+            assert predict_block(
+                **half, pgv_m_s=0.5, pga_g=0.5, model=model
+            ).probability == pytest.approx(plain.probability, rel=1e-5)
         with pytest.raises(InputError, match="lies between 0 and 1"):
             predict(**block, pgv_m_s=0.5, pga_g=0.5, model=model, level=np.array([0.9, 0.95]))
 
@@ -168,27 +168,31 @@ def test_arrays_agree_with_scalars(kind: str, term: str) -> None:
         if columns[names[0]][i] < 0.0:
             assert (many.probability[i], many.reason[i]) == (1.0, "unstable")
             continue
-        alone = one(**{name: float(v[i]) for name, v in columns.items()}, model=model, level=0.9)
+        alone = predict_block(
+            **{name: float(v[i]) for name, v in columns.items()}, model=model, level=0.9
+        )
         assert [many.probability[i], many.ci_low[i], many.ci_high[i]] == pytest.approx(
             [alone.probability, alone.ci_low, alone.ci_high], rel=1e-12, abs=1e-250
         )
         assert many.in_domain[i] == alone.in_domain
-        own = [
+        expected = [
             text
             for text in alone.warnings
             if "was not used" not in text and text not in many.warnings
         ]
-        assert len(own) == len([r for r in many.reason[i].split("; ") if r])
+        assert len(expected) == len([r for r in many.reason[i].split("; ") if r])
 
 
 def test_a_motion_answers_for_every_kind() -> None:
     motion = shaking()
-    found = one(**SLUMP, motion=motion, model=row_of("slumping"))
-    measured = one(**SLUMP, pgv_m_s=motion.pgv_m_s, pga_g=motion.pga_g, model=row_of("slumping"))
-    assert isinstance(found, MotionPrediction)
-    assert found.probability == measured.probability
-    assert found.forward == found.reverse
-    assert set(found.as_dict()["polarities"]) == {"forward", "reverse"}
+    result = predict_block(**SLUMP, motion=motion, model=row_of("slumping"))
+    measured = predict_block(
+        **SLUMP, pgv_m_s=motion.pgv_m_s, pga_g=motion.pga_g, model=row_of("slumping")
+    )
+    assert isinstance(result, MotionPrediction)
+    assert result.probability == measured.probability
+    assert result.forward == result.reverse
+    assert set(result.as_dict()["polarities"]) == {"forward", "reverse"}
 
 
 @pytest.mark.parametrize(
@@ -208,17 +212,20 @@ def test_a_motion_answers_for_every_kind() -> None:
     ],
 )
 def test_what_cannot_be_answered_is_rejected(changes: dict[str, Any], words: str) -> None:
-    asked = {**SLIDE, "pgv_m_s": 0.5, "pga_g": 0.5, "model": row_of("sliding"), **changes}
+    inputs = {**SLIDE, "pgv_m_s": 0.5, "pga_g": 0.5, "model": row_of("sliding"), **changes}
     with pytest.raises(InputError, match=words):
-        predict(**asked)
+        predict(**inputs)
 
 
 def test_a_model_of_another_rotation_is_rejected() -> None:
-    asked: dict[str, Any] = {**SLUMP, "pgv_m_s": 0.5, "pga_g": 1.0, "rotation_deg": 2.0}
+    inputs: dict[str, Any] = {**SLUMP, "pgv_m_s": 0.5, "pga_g": 1.0, "rotation_deg": 2.0}
     with pytest.raises(InputError, match="failure past recovery, not for a rotation of 2°"):
-        predict(**asked, model=row_of("slumping"))
+        predict(**inputs, model=row_of("slumping"))
     two = row_of("slumping", diagnostics={"rotation_deg": 2.0})
-    assert one(**asked, model=two).failure == "a rotation of 2 degrees or failure past recovery"
+    assert (
+        predict_block(**inputs, model=two).failure
+        == "a rotation of 2 degrees or failure past recovery"
+    )
 
 
 @pytest.mark.parametrize(
@@ -242,8 +249,8 @@ def test_an_unknown_model_or_kind_is_named(tmp_path: Any, monkeypatch: pytest.Mo
         predict(**SLIDE, pgv_m_s=0.5, pga_g=0.5, model="none-such")
     with pytest.raises(UnknownModelError, match="no falls model: there are models of "):
         predict(3.0, 0.1, kind="falls", pgv_m_s=0.5)
-    assert one(**SLIDE, pgv_m_s=0.5, pga_g=0.5).model == "sliding-pgv_pga"
-    assert one(**SLIDE, pgv_m_s=0.5).model == "sliding-pgv"
+    assert predict_block(**SLIDE, pgv_m_s=0.5, pga_g=0.5).model == "sliding-pgv_pga"
+    assert predict_block(**SLIDE, pgv_m_s=0.5).model == "sliding-pgv"
     with pytest.raises(UnknownModelError, match="no stored slumping model of a rotation of 7°"):
         predict(**SLUMP, pgv_m_s=0.5, pga_g=0.5, rotation_deg=7.0)
 
@@ -271,16 +278,16 @@ def test_a_slump_fails_sooner_when_weaker_and_under_stronger_shaking(name: str) 
     shaking = {"pgv_m_s": pulse * pga * STANDARD_GRAVITY_M_S2, "pga_g": pga}
 
     def p(more: float = 1.0, **factors: float) -> np.ndarray:
-        asked = {**block, **{each: more * value for each, value in shaking.items()}}
-        asked |= {each: factor * asked[each] for each, factor in factors.items()}
-        answer = predict(**asked, model=model, interval=False)
+        inputs = {**block, **{item: more * value for item, value in shaking.items()}}
+        inputs |= {item: factor * inputs[item] for item, factor in factors.items()}
+        answer = predict(**inputs, model=model, interval=False)
         assert isinstance(answer, PredictionArray)
         return answer.probability
 
-    here = p()
-    assert 0.0 < here.mean() < 1.0
-    assert (p(ks=1.02) <= here).all()
+    local = p()
+    assert 0.0 < local.mean() < 1.0
+    assert (p(ks=1.02) <= local).all()
     for factors in ({"more": 1.02}, {"pgv_m_s": 1.02}):
-        assert (p(**factors) >= here).all()
+        assert (p(**factors) >= local).all()
     if "magnitude" in block:
-        assert (p(magnitude=1.02) >= here).all()
+        assert (p(magnitude=1.02) >= local).all()

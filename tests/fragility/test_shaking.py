@@ -10,11 +10,10 @@ from scipy.stats import norm
 
 from rbfrag.db.location import REFERENCE
 from rbfrag.errors import InputError
-from rbfrag.fragility.joint import share_range
+from rbfrag.fragility.joint import shaken_share_range, share_range
 from rbfrag.fragility.model_selection import find_model
 from rbfrag.fragility.prediction import Prediction
 from rbfrag.fragility.shaking import POINTS, WEIGHTS, correlation
-from rbfrag.fragility.shared_shaking import shaken_share_range
 from rbfrag.question.question import predict
 
 BLOCK = {"p2": 3.6368, "kr": 0.15}
@@ -105,19 +104,21 @@ def test_several_measures_are_the_mean_over_samples(
     names: tuple[str, ...], block: tuple[float, float]
 ) -> None:
     medians = {"pgv_m_s": 0.5, "pga_g": 0.35, "sa03_g": 0.7, "sa10_g": 0.5, "sa30_g": 0.15}
-    own = dict(zip(("p2", "kr"), block, strict=True))
-    model = find_model(None, [*own, *names], REFERENCE)
+    block_inputs = dict(zip(("p2", "kr"), block, strict=True))
+    model = find_model(None, [*block_inputs, *names], REFERENCE)
     assert set(model.term.inputs) == set(names)
     sigma = {name: 0.6 + 0.03 * i for i, name in enumerate(names)}
-    stated = {f"{name.partition('_')[0]}_sigma": value for name, value in sigma.items()}
-    given = {name: medians[name] for name in names}
-    answer = ask(**own, **given, **stated, amplification_sigma=0.16)
+    nominal = {f"{name.partition('_')[0]}_sigma": value for name, value in sigma.items()}
+    arguments = {name: medians[name] for name in names}
+    answer = ask(**block_inputs, **arguments, **nominal, amplification_sigma=0.16)
     covariance = np.array(
         [[correlation(a, b) * sigma[a] * sigma[b] + 0.16**2 for b in names] for a in names]
     )
     z = np.random.default_rng(2).multivariate_normal(np.zeros(len(names)), covariance, SAMPLES)
     mean, error = sampled(
-        answer.model, **own, **{n: given[n] * np.exp(z[:, i]) for i, n in enumerate(names)}
+        answer.model,
+        **block_inputs,
+        **{n: arguments[n] * np.exp(z[:, i]) for i, n in enumerate(names)},
     )
     assert answer.probability == pytest.approx(mean, abs=2e-4 + 3.0 * error)
 
@@ -126,9 +127,11 @@ def test_arrays_answer_as_single_numbers() -> None:
     pgv, sigma = np.array([0.2, 0.5, 0.8]), np.array([0.3, 0.6, 0.0])
     many = predict(**BLOCK, pgv_m_s=pgv, pgv_sigma=sigma, db=REFERENCE)
     for i in range(3):
-        one = ask(pgv_m_s=float(pgv[i]), pgv_sigma=float(sigma[i]))
+        single = ask(pgv_m_s=float(pgv[i]), pgv_sigma=float(sigma[i]))
         for name in ("probability", "ci_low", "ci_high"):
-            assert getattr(many, name)[i] == pytest.approx(getattr(one, name), rel=1e-9, abs=1e-15)
+            assert getattr(many, name)[i] == pytest.approx(
+                getattr(single, name), rel=1e-9, abs=1e-15
+            )
 
 
 def test_amplification_moves_median_and_scatter() -> None:
@@ -158,8 +161,8 @@ def test_the_range_of_one_earthquake_takes_in_what_its_sites_share() -> None:
     assert ask(**question, sites=30).event_low is None
     alone, half, all_of_it = (ask(**question, pgv_tau=t, sites=30) for t in (0.0, 0.4, 0.6))
     widths = [
-        each.event_high - each.event_low  # type: ignore[operator]
-        for each in (alone, half, all_of_it)
+        item.event_high - item.event_low  # type: ignore[operator]
+        for item in (alone, half, all_of_it)
     ]
     assert widths[0] < widths[1] < widths[2]
 
@@ -181,10 +184,16 @@ def test_the_range_at_many_sites_is_that_of_the_limit() -> None:
     tau, sigma = 0.4, 0.6
     along = norm.cdf(1.5 * np.array(POINTS) - 1.0)
     ends = shaken_share_range(along, tau, sigma, law, 5000, 0.9)
-    random, own = np.random.default_rng(3), np.linspace(-5.0, 5.0, 201)
+    random, expected = np.random.default_rng(3), np.linspace(-5.0, 5.0, 201)
     shared = random.standard_normal((2, 20_000))
-    score = (tau * shared[0][:, None] + math.sqrt(sigma**2 - tau**2) * own) / sigma
+    score = (tau * shared[0][:, None] + math.sqrt(sigma**2 - tau**2) * expected) / sigma
     a = np.interp(score, POINTS, 1.5 * np.array(POINTS) - 1.0)
     inner = norm.cdf((a + math.sqrt(law.rho_e) * shared[1][:, None]) / math.sqrt(1.0 - law.rho_e))
-    weight = norm.pdf(own) / norm.pdf(own).sum()
+    weight = norm.pdf(expected) / norm.pdf(expected).sum()
     assert ends == pytest.approx(np.quantile(inner @ weight, (0.05, 0.95)), abs=0.02)
+
+
+def test_the_deviation_over_blocks_is_that_of_uncertain_blocks_alone() -> None:
+    question = {"p2": [3.0, 5.0], "kr": [0.1, 0.1], "pgv_m_s": 0.6, "pgv_sigma": 0.5}
+    assert predict(**question, db=REFERENCE).block_sd is None
+    assert (predict(**question, kr_sigma=0.1, db=REFERENCE).block_sd > 0.0).all()

@@ -47,13 +47,13 @@ def grid_of(model: FragilityModel, name: str, n: int = 700) -> dict[str, FloatAr
     }
     for period in ("03", "10", "20", "30"):
         every[f"sa{period}_g"] = pga * np.exp(random.normal(-0.3, 0.3, several))
-    given = {key: every[key][:, None] for key in ("p2", "kr", *model.term.inputs)}
+    arguments = {key: every[key][:, None] for key in ("p2", "kr", *model.term.inputs)}
     along = np.geomspace(1.0, STEP ** (n - 1), n)
     if name == "p2":
-        given["p2"] = 0.1 * along[along <= 300.0][None, :]
+        arguments["p2"] = 0.1 * along[along <= 300.0][None, :]
     else:
-        given[name] = given[name] * along / np.sqrt(along[-1])
-    return given
+        arguments[name] = arguments[name] * along / np.sqrt(along[-1])
+    return arguments
 
 
 OF_OUTCOMES = [
@@ -91,12 +91,12 @@ def test_the_half_width_of_eta_has_no_steps(name: str, along: str) -> None:
     model = shipped()[name]
     values = model.method.block.completed(grid_of(model, along), model.term, arrays())
     with np.errstate(all="ignore"):
-        found, h = model.form.unscaled(model.parameters, values, arrays())
-        slopes = [np.broadcast_to(s, found.eta.shape).ravel() for s in found.slopes]
+        result, h = model.form.unscaled(model.parameters, values, arrays())
+        slopes = [np.broadcast_to(s, result.eta.shape).ravel() for s in result.slopes]
         reach = h * model.errors.half_width(slopes, quantiles_of(0.95), arrays()).reshape(
-            found.eta.shape
+            result.eta.shape
         )
-        p = model.method.link.probability(found.eta * h, arrays())
+        p = model.method.link.probability(result.eta * h, arrays())
     # where the outcome is open, which is the domain of the statement; near the bounds of mechanics
     # ln(1 - v) goes to infinity within a step
     open_ = np.isfinite(reach) & (p > 0.001) & (p < 0.999)

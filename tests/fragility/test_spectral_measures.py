@@ -71,9 +71,9 @@ def test_their_values_may_be_arrays(model):
     many = predict(3.0, 0.1, sa_g={1.0: sa, 0.3: 0.9}, model=model)
     assert isinstance(many, PredictionArray)
     for i, value in enumerate(sa):
-        one = predict(3.0, 0.1, sa_g={1.0: float(value), 0.3: 0.9}, model=model)
-        assert many.probability[i] == pytest.approx(one.probability, rel=1e-12)
-        assert (many.ci_low[i], many.ci_high[i]) == pytest.approx((one.ci_low, one.ci_high))
+        single = predict(3.0, 0.1, sa_g={1.0: float(value), 0.3: 0.9}, model=model)
+        assert many.probability[i] == pytest.approx(single.probability, rel=1e-12)
+        assert (many.ci_low[i], many.ci_high[i]) == pytest.approx((single.ci_low, single.ci_high))
 
 
 @pytest.mark.parametrize(

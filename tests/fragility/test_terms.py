@@ -41,8 +41,8 @@ def test_array_and_scalar_have_the_same_bits(name):
     columns = {key: random.uniform(0.01, 2.0, 200) for key in names}
     together = TERMS[name].intensity_m_s(columns)
     for i in range(200):
-        one = TERMS[name].intensity_m_s({key: float(col[i]) for key, col in columns.items()})
-        assert one == together[i]
+        single = TERMS[name].intensity_m_s({key: float(col[i]) for key, col in columns.items()})
+        assert single == together[i]
 
 
 def test_labels_name_the_unit():
@@ -65,9 +65,9 @@ def test_terms_that_measures_suffice_for():
 
 
 def test_the_least_that_suffices():
-    found = {frozenset(inputs) for inputs in least_inputs(TERMS)}
+    values = {frozenset(inputs) for inputs in least_inputs(TERMS)}
     alone = {frozenset([name]) for name in ALONE}
-    assert found == alone | {frozenset(["pgd_m", "tm_s"])}
+    assert values == alone | {frozenset(["pgd_m", "tm_s"])}
     rocking = least_inputs(["pgv_pga", "pgv", "sa10", "pga_m", "xp"])
     assert rocking == [("pgv_m_s",), ("sa10_g",), ("pga_g", "magnitude")]
 

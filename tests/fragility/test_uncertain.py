@@ -22,7 +22,7 @@ from rbfrag.fragility.prediction_array import PredictionArray
 from rbfrag.question.document import answer_numbers
 from rbfrag.question.question import predict
 from rbfrag.solver.scatter import fraction
-from tests.fragility.test_overturning import T2, one, stored
+from tests.fragility.test_overturning import T2, predict_block, stored
 
 G = 9.80665
 
@@ -63,7 +63,7 @@ def test_lognormal_blocks_and_fragilities_add_their_variances(sigmas: tuple[floa
     of_block = math.hypot(B_K * sigmas[0], 0.5 * B_Z * sigmas[1])
     total = math.hypot(1.0, of_block)
     eta = (B0 + B_Z * ln_z + B_K * ln_k) / total
-    answer = one(lognormal(), **QUESTION, ks_sigma=sigmas[0], ps2_sigma=sigmas[1])
+    answer = predict_block(lognormal(), **QUESTION, ks_sigma=sigmas[0], ps2_sigma=sigmas[1])
     assert 0.01 < answer.probability < 0.99
     assert answer.probability == pytest.approx(norm.cdf(eta), abs=1e-6)
     # Φ(a + s z)² is that two normal variables of correlation ρ are both below the quantile
@@ -127,7 +127,7 @@ def test_a_restitution_is_normal_between_0_and_1() -> None:
 def test_rocking_blocks_of_uncertain_strength_size_and_restitution() -> None:
     model = stored("pgv_pga", T2)
     question = {"p2": 3.0, "kr": 0.2, "restitution": 0.85, "pgv_m_s": 0.6, "pga_g": 0.5}
-    answer = one(model, **question, kr_sigma=0.2, p2_sigma=0.1, restitution_sigma=0.05)
+    answer = predict_block(model, **question, kr_sigma=0.2, p2_sigma=0.1, restitution_sigma=0.05)
     draws = 200_000
     random = np.random.default_rng(5)
     drawn = {
@@ -148,7 +148,9 @@ def test_without_a_stated_restitution_each_block_has_its_own() -> None:
     weight = np.exp(-0.5 * z * z) / np.exp(-0.5 * z * z).sum()
     strengths = 0.3 * np.exp(0.2 * z)
     expected = weight @ answer_given(model, {**question, "kr": strengths}, 0.95).probability
-    assert one(model, **question, kr_sigma=0.2).probability == pytest.approx(expected, abs=1e-6)
+    assert predict_block(model, **question, kr_sigma=0.2).probability == pytest.approx(
+        expected, abs=1e-6
+    )
 
 
 @pytest.mark.parametrize("kind", ["toppling", "sliding"])
@@ -179,12 +181,12 @@ def test_arrays_answer_as_single_blocks_do(kind: str) -> None:
 def test_draws_are_answered_by_their_weighted_mean() -> None:
     p2, kr, weights = [3.0, 2.5, 4.0], [0.1, 0.14, 0.12], [1.0, 2.0, 1.0]
     motion = {"pgv_m_s": 0.6, "pga_g": 0.3}
-    each: Any = predict(p2, kr, **motion)
+    separate: Any = predict(p2, kr, **motion)
     answer: Any = predict(p2, kr, **motion, weights=weights)
     assert isinstance(answer, Prediction)
     w = np.array(weights) / 4.0
-    assert answer.probability == pytest.approx(w @ each.probability, rel=1e-12)
-    variance = w @ (each.probability - answer.probability) ** 2
+    assert answer.probability == pytest.approx(w @ separate.probability, rel=1e-12)
+    variance = w @ (separate.probability - answer.probability) ** 2
     assert answer.block_sd == pytest.approx(math.sqrt(variance), rel=1e-12)
     assert answer.ci_low < answer.probability < answer.ci_high
     same: Any = predict([3.0] * 4, [0.1] * 4, **motion, weights=1.0)
@@ -203,7 +205,7 @@ def test_extrapolation_is_said_where_part_of_the_block_is_outside() -> None:
 
 
 @pytest.mark.parametrize(
-    ("given", "words"),
+    ("inputs", "words"),
     [
         ({"kr_sigma": -0.1}, "kr_sigma = -0.1: give a standard deviation of 0 or more"),
         ({"kr_sigma": math.nan}, "kr_sigma = nan"),
@@ -219,14 +221,16 @@ def test_extrapolation_is_said_where_part_of_the_block_is_outside() -> None:
         ({"pgv_m_s": [0.1, 0.2], "weights": 1.0}, "a single motion is required"),
     ],
 )
-def test_what_is_no_uncertainty_is_rejected(given: dict[str, Any], words: str) -> None:
+def test_what_is_no_uncertainty_is_rejected(inputs: dict[str, Any], words: str) -> None:
     with pytest.raises(InputError, match=words):
-        predict(**{"p2": 3.0, "kr": 0.1, "pgv_m_s": 0.6, **given})
+        predict(**{"p2": 3.0, "kr": 0.1, "pgv_m_s": 0.6, **inputs})
 
 
 def test_a_sigma_without_its_value_is_rejected() -> None:
     with pytest.raises(InputError, match="restitution_sigma requires restitution"):
-        one(stored("pgv_pga", T2), p2=3.0, kr=0.2, pgv_m_s=0.6, pga_g=0.5, restitution_sigma=0.1)
+        predict_block(
+            stored("pgv_pga", T2), p2=3.0, kr=0.2, pgv_m_s=0.6, pga_g=0.5, restitution_sigma=0.1
+        )
 
 
 def test_in_arrays_a_negative_sigma_has_its_reason() -> None:
@@ -255,11 +259,11 @@ def test_other_models_are_asked_of_the_uncertain_block_too():
     }
     document = answer_numbers(question, db=REFERENCE).as_dict()
     assert len(document["answers"]) > 3
-    for each in document["answers"]:
-        alone = predict(**question, db=REFERENCE, model=each["model"])
-        assert each["probability"] == alone.probability
-        certain = predict(**{**question, "kr_sigma": 0.0}, db=REFERENCE, model=each["model"])
-        assert each["probability"] != certain.probability
+    for answer in document["answers"]:
+        alone = predict(**question, db=REFERENCE, model=answer["model"])
+        assert answer["probability"] == alone.probability
+        certain = predict(**{**question, "kr_sigma": 0.0}, db=REFERENCE, model=answer["model"])
+        assert answer["probability"] != certain.probability
     *warnings, note = predict(**question, db=REFERENCE).warnings
     assert warnings == document["warnings"][:-1]
     assert note.code == document["warnings"][-1].code == "single_component"

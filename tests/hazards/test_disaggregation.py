@@ -11,10 +11,10 @@ import pytest
 import rbfrag
 from rbfrag.errors import InputError
 from rbfrag.exchange.event_losses import losses
-from rbfrag.exchange.openquake.events import JobFiles, read_events, read_magnitudes
+from rbfrag.exchange.openquake_events import job_files, read_events, read_magnitudes
 from rbfrag.hazards.curve import hazard_curve
 from rbfrag.hazards.disaggregation import Disaggregation
-from rbfrag.hazards.im_uncertainty import component_of_velocity, velocity_of
+from rbfrag.hazards.shaking import component_of_velocity, velocity_of
 from rbfrag.question.components import COMPONENTS
 
 HEAD = """#,,,,"generated_by='OpenQuake engine 3.26.2', investigation_time=50.0, \
@@ -40,14 +40,14 @@ def written(tmp_path: Path, text: str) -> Path:
 
 
 def test_shares_are_those_of_rates_at_the_levels(tmp_path: Path) -> None:
-    known = Disaggregation.read(written(tmp_path, MAG))
+    parsed = Disaggregation.read(written(tmp_path, MAG))
     weak, strong = -np.log1p([-0.3, -0.2]), -np.log1p([-0.01, -0.06])
-    assert known.levels.tolist() == [0.02, 0.4]
-    assert known.magnitude.tolist() == [5.25, 7.25]
-    assert (known.lon, known.lat) == (174.776, -41.279)
-    assert known.share == pytest.approx(np.stack([weak / weak.sum(), strong / strong.sum()]))
-    between = known.shares(np.log([0.001, 0.02, math.sqrt(0.02 * 0.4), 0.4, 2.0])).T
-    ends = known.share
+    assert parsed.levels.tolist() == [0.02, 0.4]
+    assert parsed.magnitude.tolist() == [5.25, 7.25]
+    assert (parsed.lon, parsed.lat) == (174.776, -41.279)
+    assert parsed.share == pytest.approx(np.stack([weak / weak.sum(), strong / strong.sum()]))
+    between = parsed.shares(np.log([0.001, 0.02, math.sqrt(0.02 * 0.4), 0.4, 2.0])).T
+    ends = parsed.share
     assert between == pytest.approx(
         np.stack([ends[0], ends[0], ends.mean(axis=0), ends[1], ends[1]])
     )
@@ -58,9 +58,9 @@ def test_distances_are_summed(tmp_path: Path) -> None:
         "imt,iml,poe,mag,dist,rlz0\nPGA,.1,.1,5.5,10,.02\nPGA,.1,.1,5.5,30,.01\n"
         "PGA,.1,.1,6.5,10,.03\n"
     )
-    known = Disaggregation.read(written(tmp_path, text))
+    parsed = Disaggregation.read(written(tmp_path, text))
     r = -np.log1p(-np.array([0.02, 0.01, 0.03]))
-    assert known.share[0, 0] == pytest.approx((r[0] + r[1]) / r.sum())
+    assert parsed.share[0, 0] == pytest.approx((r[0] + r[1]) / r.sum())
 
 
 def test_one_magnitude_is_the_curve_moved_by_the_law(tmp_path: Path) -> None:
@@ -69,28 +69,28 @@ def test_one_magnitude_is_the_curve_moved_by_the_law(tmp_path: Path) -> None:
     curve = hazard_curve(
         "pga_g", np.geomspace(1e-4, 1e3, 200), 1e-3 * np.geomspace(1e-4, 1e3, 200) ** -2.0
     )
-    known = Disaggregation.read(written(tmp_path, text))
+    parsed = Disaggregation.read(written(tmp_path, text))
     for name in ("single", "larger"):
         component = component_of_velocity(COMPONENTS[name])
-        made = known.velocity_curve(curve, component=name)
+        result = parsed.velocity_curve(curve, component=name)
         pga = np.array([0.1, 0.3, 1.0])
         velocity = velocity_of(pga, np.array(6.5)) / component.ratio("pgv_m_s")
         expected = 1e-3 * pga**-2.0 * math.exp(0.5 * (2.0 / 0.873 * component.sigma) ** 2)
-        assert made.rate_at(velocity) == pytest.approx(expected, rel=2e-4)
+        assert result.rate_at(velocity) == pytest.approx(expected, rel=2e-4)
 
 
 def test_rates_are_those_of_the_events_that_it_is_made_of(
     formats_dir: Path, tmp_path: Path
 ) -> None:
     folder = formats_dir / "openquake_event_based" / "one_realization"
-    events = read_events(JobFiles.of(folder), imts=("PGA",))
-    magnitudes = read_magnitudes(JobFiles.of(folder))
+    events = read_events(job_files(folder), imts=("PGA",))
+    magnitudes = read_magnitudes(job_files(folder))
     assert magnitudes is not None
     p2, kr = np.repeat([30.0, 10.0, 3.0, 1.0], 3), np.tile([0.05, 0.1, 0.12], 4)
     for site in (0, 7):
-        here = events.site == site
-        pga = events.measures["pga_g"][here]
-        event = events.event[here]
+        local = events.site == site
+        pga = events.measures["pga_g"][local]
+        event = events.event[local]
         weight, bins = events.weight[event], np.floor(magnitudes[event] / 0.1) * 0.1 + 0.05
         levels = np.append(np.geomspace(pga.min(), pga.max(), 60), 1.1 * pga.max())
         curve = hazard_curve("pga_g", levels, [weight[pga >= x].sum() for x in levels])

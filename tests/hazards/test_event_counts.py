@@ -49,12 +49,12 @@ def portfolio(
     of: EventSet, law: dict[str, float] | None, meaning: str, **columns: Any
 ) -> Portfolio:
     """Return blocks of toppling velocities y [m/s]."""
-    given = table(columns.pop("y"), columns.pop("site", "s0"), **columns)
-    n = given["kr"].size
+    inputs = table(columns.pop("y"), columns.pop("site", "s0"), **columns)
+    n = inputs["kr"].size
     names = np.array([str(i) for i in range(n)], dtype=object)
-    whole = {"block_id": names, "kind": np.full(n, "toppling", dtype=object), **given}
+    complete = {"block_id": names, "kind": np.full(n, "toppling", dtype=object), **inputs}
     model = FragilityModel.from_row(model_row(dependence=law))
-    return Portfolio.of(whole, of.site_ids, {"toppling": model}, component_named(meaning))
+    return Portfolio.of(complete, of.site_ids, {"toppling": model}, component_named(meaning))
 
 
 def counted(of: EventSet, blocks: Portfolio, samples: int, **about: Any) -> PartCounts:
@@ -72,15 +72,15 @@ def test_ten_like_blocks_are_ten_rows(
     row = portfolio(shaking, law, meaning, y=[0.36, 0.3], count=[10.0, 1.0], kr_sigma=sigma)
     rows = portfolio(shaking, law, meaning, y=[0.36] * 10 + [0.3], kr_sigma=sigma)
     assert (row.size, rows.size) == (2, 11)
-    one, other = (counted(shaking, each, samples) for each in (row, rows))
-    assert one.failures == pytest.approx(other.failures)
-    assert one.bounds == pytest.approx(other.bounds)
+    single, other = (counted(shaking, item, samples) for item in (row, rows))
+    assert single.failures == pytest.approx(other.failures)
+    assert single.bounds == pytest.approx(other.bounds)
     # every number of failures as often, to four standard errors of both
-    first, second = one.counts.events[0], other.counts.events[0]
+    first, second = single.counts.events[0], other.counts.events[0]
     assert first.shape == (1 if law else 2, 11)
     error = np.sqrt(2.0 * second * (1.0 - second) / (2 * samples)) + 1e-4
     np.testing.assert_array_less(np.abs(first - second), 4.0 * error)
-    assert one.any_fails == pytest.approx(other.any_fails, abs=4.0 * np.sqrt(0.5 / samples))
+    assert single.any_fails == pytest.approx(other.any_fails, abs=4.0 * np.sqrt(0.5 / samples))
 
 
 def test_two_like_blocks_fail_together_as_the_law_has_it() -> None:
@@ -143,7 +143,7 @@ def test_shifted_models_answer_by_the_same_samples(meaning: str) -> None:
     assert (same <= more).all()
     assert less[0] < same[0] < more[0]
     # as far apart as a run of its own says, without its scatter
-    ends = [counted(shaking, each, 4000).counts.events[0, 0, :2] for each in by[1:]]
+    ends = [counted(shaking, item, 4000).counts.events[0, 0, :2] for item in by[1:]]
     apart = np.log(ends[0] / ends[1])
     result = counted(shaking, blocks, 1000, shifted=by)
     _, _, more, less = result.counts.events[0]
@@ -157,11 +157,11 @@ def test_shifts_on_nodes_are_those_of_each_pair(meaning: str) -> None:
     part = EventYears(0, blocks, shaking, np.empty(0), np.empty(0), 1, 0)
     by = shifted_portfolios(blocks)
     nodes, pairs = (
-        [shaken.shift for _, shaken in _shaken(part._replace(shifted=each))]
-        for each in (by, (*by, by[0]))  # another number than that of the axes: no nodes
+        [shaken.shift for _, shaken in _shaken(part._replace(shifted=item))]
+        for item in (by, (*by, by[0]))  # another number than that of the axes: no nodes
     )
-    for one, other in zip(nodes, pairs, strict=True):
-        np.testing.assert_allclose(one, other[:-1], atol=5e-4, rtol=1e-2)
+    for node, other in zip(nodes, pairs, strict=True):
+        np.testing.assert_allclose(node, other[:-1], atol=5e-4, rtol=1e-2)
 
 
 def test_error_from_the_axes() -> None:
@@ -178,8 +178,8 @@ def test_sums_of_costs_have_three_moments() -> None:
         square = np.exp(sigma**2)
         assert values.mean() == pytest.approx(n * np.sqrt(square), rel=2e-3)
         assert values.var() == pytest.approx(n * square * (square - 1.0), rel=0.03)
-    one, other = (np.quantile(values, (0.01, 0.5, 0.99)) for values in laws)
-    assert one == pytest.approx(other, rel=0.01)
+    single, other = (np.quantile(values, (0.01, 0.5, 0.99)) for values in laws)
+    assert single == pytest.approx(other, rel=0.01)
 
 
 def test_many_blocks_have_the_law_of_draws_of_each(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -190,12 +190,12 @@ def test_many_blocks_have_the_law_of_draws_of_each(monkeypatch: pytest.MonkeyPat
         shaking, SHARED, "rotd50", y=y, site=site, loss=10.0, loss_sigma=0.4,
         count=random.integers(1, 4, 240).astype(float),
     )  # fmt: skip
-    each = counted(shaking, blocks, 3000)
+    separate = counted(shaking, blocks, 3000)
     monkeypatch.setattr(event_counts, "LARGE", 100)
     many = counted(shaking, blocks, 3000, shifted=(blocks,))
-    np.testing.assert_allclose(many.any_fails, each.any_fails, atol=0.03)
-    np.testing.assert_allclose(many.loss_variance, each.loss_variance, rtol=0.2)
-    assert many.loss_variance.sum() == pytest.approx(each.loss_variance.sum(), rel=0.08)
-    first, second = many.counts.events[0], each.counts.events[0, 0]
+    np.testing.assert_allclose(many.any_fails, separate.any_fails, atol=0.03)
+    np.testing.assert_allclose(many.loss_variance, separate.loss_variance, rtol=0.2)
+    assert many.loss_variance.sum() == pytest.approx(separate.loss_variance.sum(), rel=0.08)
+    first, second = many.counts.events[0], separate.counts.events[0, 0]
     np.testing.assert_array_equal(first[0], first[1])
     np.testing.assert_allclose(first[0], second, atol=0.03)

@@ -17,11 +17,11 @@ from rbfrag.results.numbers import annual_rate, return_period, return_periods, w
 from tests.fragility.conftest import SHARED, model_row
 
 
-def answered(p2: Any = 3.0, kr: Any = 0.1, *, last: float = 10.0, **asked: Any) -> HazardAnswer:
+def answered(p2: Any = 3.0, kr: Any = 0.1, *, last: float = 10.0, **inputs: Any) -> HazardAnswer:
     """Return the rates under a power law of PGV up to a last level [m/s]."""
     x = np.geomspace(0.01, last, 20)
     curve = hazard_curve("pgv_m_s", x, 1e-3 * x**-2.0)
-    return hazard(curve, p2, kr, model=model_row(dependence=SHARED), component="single", **asked)
+    return hazard(curve, p2, kr, model=model_row(dependence=SHARED), component="single", **inputs)
 
 
 def test_one_block_has_a_return_period_with_its_interval() -> None:
@@ -77,8 +77,8 @@ def test_the_range_of_a_truncated_curve_is_in_tables_and_documents() -> None:
 def test_a_curve_that_begins_too_late_gives_no_upper_bound() -> None:
     x = np.geomspace(1.0, 10.0, 20)
     curve = hazard_curve("pgv_m_s", x, 1e-3 * x**-2.0)
-    asked: dict[str, Any] = {"model": model_row(dependence=SHARED), "component": "single"}
-    alone = hazard(curve, 3.0, 0.1, **asked)
+    inputs: dict[str, Any] = {"model": model_row(dependence=SHARED), "component": "single"}
+    alone = hazard(curve, 3.0, 0.1, **inputs)
     first, second, *_ = alone.sentences()
     period, rate = return_period(alone.annual_rate[0]), annual_rate(alone.annual_rate[0])
     assert first == (
@@ -86,7 +86,7 @@ def test_a_curve_that_begins_too_late_gives_no_upper_bound() -> None:
     )
     assert second.startswith(f"Mean annual rate at least {rate} /yr; P(failure in 50 years) at ")
     assert alone.as_dict()["annual_rate_upper_bound"] is None
-    several = hazard(curve, [3.0, 3.0], 0.1, joint=True, **asked)
+    several = hazard(curve, [3.0, 3.0], 0.1, joint=True, **inputs)
     assert several.as_dict()["expected_failures_upper_bound"] is None
     first, second, *_ = several.sentences()
     assert re.fullmatch(
@@ -131,8 +131,8 @@ def test_the_component_is_noted_where_it_matters() -> None:
     assert "return period" not in note
     several = hazard(curve, [3.0, 3.0], 0.1, model=row)
     assert any("assumed to be of a single horizontal" in text for text in several.warnings)
-    for asked in ({"kr": 300.0}, {"kr": 0.1, "component": "single"}):
-        answer = hazard(curve, p2=3.0, model=row, **asked)  # type: ignore[arg-type]
+    for inputs in ({"kr": 300.0}, {"kr": 0.1, "component": "single"}):
+        answer = hazard(curve, p2=3.0, model=row, **inputs)  # type: ignore[arg-type]
         assert not any("single horizontal component" in text for text in answer.warnings)
 
 
@@ -152,16 +152,16 @@ def test_the_contributions_of_weighted_branches_are_those_of_their_mean() -> Non
         hazard_curve("pgv_m_s", x, rate * x**-slope, statistic=f"rlz-{i:03d}")
         for i, (rate, slope) in enumerate(((1e-3, 2.0), (2e-3, 1.5), (1e-4, 3.0)))
     ]
-    asked: dict[str, Any] = {"model": model_row(), "component": "rotd50"}
-    found = hazard(curves, 3.0, 0.1, weights=weights, **asked)
-    branches = [hazard(curve, 3.0, 0.1, **asked) for curve in curves]
+    inputs: dict[str, Any] = {"model": model_row(), "component": "rotd50"}
+    answer = hazard(curves, 3.0, 0.1, weights=weights, **inputs)
+    branches = [hazard(curve, 3.0, 0.1, **inputs) for curve in curves]
     for name in ("contribution", "above", "above_at_most", "annual_rate"):
-        mean = sum(w * getattr(one, name) for w, one in zip(weights, branches, strict=True))
-        np.testing.assert_allclose(getattr(found, name), mean, rtol=1e-9, atol=1e-18)
-    whole = found.contribution.sum() + found.above[0]
-    assert whole == pytest.approx(found.annual_rate[0], rel=1e-3)
-    assert found.fractions_between(found.edges).sum() == pytest.approx(
-        found.contribution.sum() / found.annual_rate[0]
+        mean = sum(w * getattr(branch, name) for w, branch in zip(weights, branches, strict=True))
+        np.testing.assert_allclose(getattr(answer, name), mean, rtol=1e-9, atol=1e-18)
+    total = answer.contribution.sum() + answer.above[0]
+    assert total == pytest.approx(answer.annual_rate[0], rel=1e-3)
+    assert answer.fractions_between(answer.edges).sum() == pytest.approx(
+        answer.contribution.sum() / answer.annual_rate[0]
     )
 
 

@@ -15,7 +15,7 @@ from rbfrag.fragility.model_selection import find_model
 from rbfrag.fragility.prediction import Prediction, answer_given
 from rbfrag.hazards.curve import HazardCurve, hazard_curve
 from rbfrag.hazards.hazard_rates import hazard
-from rbfrag.hazards.im_uncertainty import CONVERSIONS
+from rbfrag.hazards.shaking import CONVERSIONS
 from tests.hazards.conftest import measure_row
 
 K, B = 1e-4, 2.0
@@ -33,8 +33,8 @@ def power_law(measure: str, period_s: float | None, reach: float = 1e5) -> Hazar
 
 
 def probability(model: Any, measure: str, level: float) -> float:
-    found = find_model(model, ("p2", "kr", measure))
-    answer = answer_given(found, {"p2": 3.0, "kr": 0.1, measure: level}, 0.95)
+    result = find_model(model, ("p2", "kr", measure))
+    answer = answer_given(result, {"p2": 3.0, "kr": 0.1, measure: level}, 0.95)
     assert isinstance(answer, Prediction)
     return answer.probability
 
@@ -44,9 +44,9 @@ def test_each_measure_is_answered_by_its_own_model(measures_db: str, term: str) 
     measure, period, name = CURVES[term]
     model = "bounded-pga" if term == "pga" else None
     about: dict[str, Any] = {"component": "single", "db": measures_db, "model": model}
-    found = hazard(power_law(measure, period), 3.0, 0.1, **about)
-    assert found.tau == (None if term == "pga" else 0.15)
-    assert (found.term, found.measure) == (term, measure)
+    answer = hazard(power_law(measure, period), 3.0, 0.1, **about)
+    assert answer.tau == (None if term == "pga" else 0.15)
+    assert (answer.term, answer.measure) == (term, measure)
     row = measure_row(term)
     # λ_f = ∫ P K B x^-B d(ln x), past the lowest level at which the block may fail
     total, edges = 0.0, np.linspace(math.log(1e-5), math.log(1e5), 41)
@@ -55,8 +55,8 @@ def test_each_measure_is_answered_by_its_own_model(measures_db: str, term: str) 
             lambda u: probability(row, name, math.exp(u)) * K * B * math.exp(-B * u),
             low, high, epsabs=1e-13, epsrel=1e-9, limit=200,
         )[0]  # fmt: skip
-    assert found.annual_rate[0] == pytest.approx(total, rel=1e-5)
-    assert found.ci_low[0] < found.annual_rate[0] < found.ci_high[0]
+    assert answer.annual_rate[0] == pytest.approx(total, rel=1e-5)
+    assert answer.ci_low[0] < answer.annual_rate[0] < answer.ci_high[0]
 
 
 def test_a_logistic_fragility_on_a_power_law(measures_db: str) -> None:
@@ -68,9 +68,9 @@ def test_a_logistic_fragility_on_a_power_law(measures_db: str) -> None:
         scores.append(math.log(p / (1.0 - p)))
     s = (scores[1] - scores[0]) / math.log(4.0)
     median = 0.2 * math.exp(-scores[0] / s)
-    found = hazard(power_law("sa_g", 1.0), 3.0, 0.1, component="single", db=measures_db)
+    answer = hazard(power_law("sa_g", 1.0), 3.0, 0.1, component="single", db=measures_db)
     expected = K * median**-B * (math.pi * B / s) / math.sin(math.pi * B / s)
-    assert found.annual_rate[0] == pytest.approx(expected, rel=1e-4)
+    assert answer.annual_rate[0] == pytest.approx(expected, rel=1e-4)
 
 
 @pytest.mark.parametrize("sigma", [None, 0.2, 0.7])
@@ -80,34 +80,36 @@ def test_the_scatter_of_a_conversion_is_integrated(
 ) -> None:
     used = CONVERSIONS[name]
     of_pgv = hazard(power_law("pgv_m_s", None), 3.0, 0.1, component="single", db=measures_db)
-    found = hazard(
+    answer = hazard(
         power_law("sa_g", used.period_s), 3.0, 0.1, convert=name, convert_sigma=sigma,
         component="single", db=measures_db,
     )  # fmt: skip
     spread = used.scatter if sigma is None else sigma
     # PGV = factor x exp(spread ξ): the rates of PGV are those of x times factor^B exp(B² spread²/2)
     expected = of_pgv.annual_rate[0] * used.factor**B * math.exp(0.5 * (B * spread) ** 2)
-    assert found.annual_rate[0] == pytest.approx(expected, rel=2e-3)
-    assert found.term == "pgv_kr"
-    assert any(f"σ_ln {spread:g}, integrated" in text for text in found.warnings)
+    assert answer.annual_rate[0] == pytest.approx(expected, rel=2e-3)
+    assert answer.term == "pgv_kr"
+    assert any(f"σ_ln {spread:g}, integrated" in text for text in answer.warnings)
 
 
 def test_one_class_of_blocks(measures_db: str) -> None:
     curve = power_law("sa_g", 1.0)
-    each = hazard(curve, [3.0, 10.0], [0.1, 0.2], component="rotd50", db=measures_db)
-    one = hazard(curve, [3.0, 10.0], [0.1, 0.2], component="rotd50", one_class=True, db=measures_db)
-    assert one.annual_rate[0] == pytest.approx(each.annual_rate.mean(), rel=1e-4)
+    separate = hazard(curve, [3.0, 10.0], [0.1, 0.2], component="rotd50", db=measures_db)
+    single = hazard(
+        curve, [3.0, 10.0], [0.1, 0.2], component="rotd50", one_class=True, db=measures_db
+    )
+    assert single.annual_rate[0] == pytest.approx(separate.annual_rate.mean(), rel=1e-4)
 
 
 def test_a_measure_that_knows_little_is_said(measures_db: str) -> None:
-    asked: dict[str, Any] = {"component": "single", "db": measures_db}
+    inputs: dict[str, Any] = {"component": "single", "db": measures_db}
     words = "PGA alone is biased; give a curve of PGV .* accept the bias with model bounded-pga"
     with pytest.raises(InputError, match=words):
-        hazard(power_law("pga_g", None), 3.0, 0.1, **asked)
-    told = hazard(power_law("pga_g", None), 3.0, 0.1, model="bounded-pga", **asked).warnings
-    assert any("PGA alone is biased" in text for text in told)
-    assert any("PGA alone predicts" in text for text in told)
-    quiet = hazard(power_law("sa_g", 1.0), 3.0, 0.1, **asked).warnings
+        hazard(power_law("pga_g", None), 3.0, 0.1, **inputs)
+    document = hazard(power_law("pga_g", None), 3.0, 0.1, model="bounded-pga", **inputs).warnings
+    assert any("PGA alone is biased" in text for text in document)
+    assert any("PGA alone predicts" in text for text in document)
+    quiet = hazard(power_law("sa_g", 1.0), 3.0, 0.1, **inputs).warnings
     assert not any("PGA alone predicts" in text for text in quiet)
 
 
@@ -115,10 +117,10 @@ def test_a_measure_that_knows_little_is_said(measures_db: str) -> None:
 def test_no_other_period_is_answered(measures_db: str, period: float) -> None:
     listed = r"one of PGV, SA\(1\), PGA"
     with pytest.raises(
-        InputError, match=rf"no model reads SA\({period:g}\) alone: .*{listed}"
-    ) as told:
+        InputError, match=rf"no model uses SA\({period:g}\) alone: .*{listed}"
+    ) as caught:
         hazard(power_law("sa_g", period), 3.0, 0.1, db=measures_db)
-    assert ("bommer_alarcon_2006" in str(told.value)) is (period == 0.5)
+    assert ("bommer_alarcon_2006" in str(caught.value)) is (period == 0.5)
 
 
 @pytest.mark.parametrize("model", ["bounded-pga_sa10", "bounded-pgv_kr"])

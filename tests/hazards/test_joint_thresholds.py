@@ -1,4 +1,4 @@
-"""How often so many blocks of a site fail: closed forms, limits, bounds, independent samples."""
+"""Rate of at least k failures at a site: closed forms, limits, bounds, independent samples."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from scipy.stats import binom, multivariate_normal
 from rbfrag.fragility.dependence import Dependence
 from rbfrag.fragility.joint import Placement
 from rbfrag.fragility.joint_sampling import JointSampler
-from rbfrag.hazards.joint_thresholds import joint_rates
+from rbfrag.hazards.joint_rate import joint_rates
 from rbfrag.solver.results import FloatArray
-from tests.fragility.portfolio_draws import LAW, SHARED
+from tests.fragility.portfolio_draws import LAW, SHARED, correlation
 
 U = np.arange(-4.0, 2.0, 0.0112)
 MASS = 0.0112 * 2.5e-3 * np.exp(-2.5 * U)
@@ -42,14 +42,14 @@ def test_one_block_is_its_own_rate() -> None:
 
 def test_two_blocks_by_the_normal_law_of_their_sides() -> None:
     where, p = blocks(2, seed=3)
-    some = slice(150, None, 40)  # scipy's own integral, node by node
+    subset = slice(150, None, 40)  # scipy's own integral, node by node
     mass = np.zeros(U.size)
-    mass[some] = MASS[some]
+    mass[subset] = MASS[subset]
     both = np.zeros(U.size)
     for sides, weight in (((0, 1, 1, 1), 0.5), ((0, 0, 1, 1), 0.25), ((0, 0, 1, -1), 0.25)):
-        known = Placement.of(where.l, where.ln_y, component=sides[:2], polarity=sides[2:])
-        law = multivariate_normal(np.zeros(2), known.correlation(LAW))
-        both[some] += weight * law.cdf(ndtri(p[:, some]).T)
+        expected = Placement.of(where.l, where.ln_y, component=sides[:2], polarity=sides[2:])
+        law = multivariate_normal(np.zeros(2), correlation(LAW, expected))
+        both[subset] += weight * law.cdf(ndtri(p[:, subset]).T)
     rates = joint_rates(p[None], mass, where, LAW, (1, 2))
     assert rates.rate[1, 0] == pytest.approx(float(both @ mass), rel=1e-6)
     assert rates.rate[:, 0].sum() == pytest.approx(float(p.sum(axis=0) @ mass), rel=1e-12)
@@ -62,8 +62,8 @@ def test_ones_that_share_all_or_nothing_are_exact(n: int) -> None:
     alike = Placement.of(0.5, where.ln_y, polarity=0)
     counts = range(1, n + 1)
     together = joint_rates(p[None], MASS, alike, TOGETHER, counts)
-    each = np.sort(p @ MASS)[::-1]
-    np.testing.assert_allclose(together.rate[:, 0], each, rtol=1e-12)
+    separate = np.sort(p @ MASS)[::-1]
+    np.testing.assert_allclose(together.rate[:, 0], separate, rtol=1e-12)
     same = np.broadcast_to(p[0], p.shape)
     apart = joint_rates(same[None], MASS, where, APART, counts)
     expected = [binom.sf(k - 1, n, p[0]) @ MASS for k in counts]
@@ -82,11 +82,12 @@ def test_rates_are_those_of_samples(n: int) -> None:
     z = JointSampler(LAW, where).normals(20_000, np.random.default_rng(0))
     bound = ndtri(np.minimum(p, 1.0 - 1e-16))
     node = np.stack([np.searchsorted(bound[i], z[:, i]) for i in range(n)], axis=1)
-    each = np.sort(np.append(above, 0.0)[node], axis=1)[:, ::-1]
+    separate = np.sort(np.append(above, 0.0)[node], axis=1)[:, ::-1]
     for i, k in enumerate(rates.counts):
-        error = each[:, k - 1].std() / np.sqrt(len(z))
+        error = separate[:, k - 1].std() / np.sqrt(len(z))
         assert (
-            abs(rates.rate[i, 0] - each[:, k - 1].mean()) < 4.0 * error + 0.006 * rates.rate[i, 0]
+            abs(rates.rate[i, 0] - separate[:, k - 1].mean())
+            < 4.0 * error + 0.006 * rates.rate[i, 0]
         )
     assert rates.error[0] < 0.01 * rates.rate[0, 0]
 
@@ -109,7 +110,7 @@ def test_like_blocks_by_the_sides_that_they_face() -> None:
     rates = joint_rates(np.stack([p, p, p])[None], MASS, where, LAW)
     sides = Placement.of(np.zeros(4), 0.0, component=[0, 0, 1, 1], polarity=[1, -1, 1, -1])
     z = np.random.default_rng(1).multivariate_normal(
-        np.zeros(4), sides.correlation(LAW), size=400_000
+        np.zeros(4), correlation(LAW, sides), size=400_000
     )
     faced = np.random.default_rng(2).integers(4, size=(len(z), 3))
     first = np.take_along_axis(z, faced, axis=1).min(axis=1)

@@ -18,15 +18,15 @@ from rbfrag.db.engine import opened_database
 from rbfrag.db.models import save_model
 from rbfrag.errors import InputError
 from rbfrag.exchange.event_losses import losses
-from rbfrag.exchange.openquake.events import JobFiles, read_events
+from rbfrag.exchange.openquake_events import job_files, read_events
 from rbfrag.fragility.joint_sampling import JointSampler
 from rbfrag.fragility.methods import method_named
 from rbfrag.hazards import event_counts
 from rbfrag.hazards.curve_file import read_hazard_curves
 from rbfrag.hazards.event_counts import EventBatch, EventYears, count_years
+from rbfrag.hazards.event_set import rate_interval, share_interval
 from rbfrag.hazards.hazard_rates import hazard
 from rbfrag.hazards.loss_answer import LossAnswer
-from rbfrag.hazards.uncertainty import rate_interval, share_interval
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.question.components import COMPONENT_SIGMA
 from rbfrag.question.question import predict
@@ -42,8 +42,8 @@ def table(y: Any, site: Any, **columns: Any) -> dict[str, Any]:
     """Blocks of toppling velocities y [m/s] and one size at sites."""
     kr = np.atleast_1d(np.asarray(y, dtype=np.float64)) * 2.0 / STANDARD_GRAVITY_M_S2
     sites = np.array([site] * kr.size if isinstance(site, str) else site, dtype=object)
-    given = {name: np.broadcast_to(value, kr.size) for name, value in columns.items()}
-    return {"p2_1_s2": np.full(kr.size, 4.0), "kr": kr, "site_id": sites, **given}
+    inputs = {name: np.broadcast_to(value, kr.size) for name, value in columns.items()}
+    return {"p2_1_s2": np.full(kr.size, 4.0), "kr": kr, "site_id": sites, **inputs}
 
 
 def probability(y: float, pgv: Any) -> Any:
@@ -89,7 +89,7 @@ def test_three_realizations_by_hand(job: Path) -> None:
 def test_largest_event_and_sum_of_a_year(job: Path) -> None:
     # y = 0.05: certain to fail wherever the ground shakes
     answer = answered(job, table([0.05] * 3, ["0012", "007", "Z9"]), samples=4)
-    curve = {one.value: one for one in answer.exceedance["the model's copula"]}
+    curve = {item.value: item for item in answer.exceedance["the model's copula"]}
     # event 0 fails two, 1 one (in the same year), 3 and 4 one each
     assert curve[1].annual_rate == pytest.approx(0.005 + 0.005 + 0.003 + 0.002)
     assert curve[2].annual_rate == pytest.approx(0.005)
@@ -100,7 +100,7 @@ def test_largest_event_and_sum_of_a_year(job: Path) -> None:
     assert 3 not in curve  # no event fails three; the year's sum does
     assert answer.annual_rate_any == pytest.approx(0.015)
     effective = 100.0 / (0.25 + 0.09 + 0.04)
-    assert [one.beyond_effective_time for one in curve.values()] == [
+    assert [item.beyond_effective_time for item in curve.values()] == [
         0.015 * effective < 1.0,
         0.005 * effective < 1.0,
     ]
@@ -112,10 +112,10 @@ def test_sum_of_a_year_reaches_what_no_event_does(tmp_path: Path) -> None:
     shaking += [(2, 80.0, "007")]
     folder = write_job(tmp_path, events=events, shaking=shaking, weights=(1.0,))
     answer = answered(folder, table([0.05, 0.05], ["Z9", "007"]), samples=2)
-    one, two = answer.exceedance["the model's copula"]
-    assert (one.annual_rate, two.annual_rate) == pytest.approx((0.03, 0.01))
-    assert (one.largest_of_year, two.largest_of_year) == pytest.approx((0.02, 0.01))
-    assert (one.sum_of_year, two.sum_of_year) == pytest.approx((0.02, 0.02))
+    single, two = answer.exceedance["the model's copula"]
+    assert (single.annual_rate, two.annual_rate) == pytest.approx((0.03, 0.01))
+    assert (single.largest_of_year, two.largest_of_year) == pytest.approx((0.02, 0.01))
+    assert (single.sum_of_year, two.sum_of_year) == pytest.approx((0.02, 0.02))
 
 
 def test_samples_of_a_tree(tmp_path: Path) -> None:
@@ -132,33 +132,33 @@ def test_a_scenario(tmp_path: Path) -> None:
     shaking = [(0, 80.0, "Z9"), (1, 80.0, "Z9"), (1, 80.0, "007"), (2, 80.0, "007")]
     folder = write_job(tmp_path, events=events, shaking=shaking, weights=(0.4, 0.6), ruptures=False)
     answer = answered(folder, table([0.05, 0.05], ["Z9", "007"], loss=10.0), samples=3)
-    found = answer.as_dict()
-    assert found["scenario"]
-    assert found["average_annual_failures"] is None
-    assert found["annual_rate_any"] is None
-    assert found["effective_years"] is None
+    document = answer.as_dict()
+    assert document["scenario"]
+    assert document["average_annual_failures"] is None
+    assert document["annual_rate_any"] is None
+    assert document["effective_years"] is None
     # realizations of the motion weigh .2, .2 and .6 and fail one, two and one
-    assert found["expected_failures"] == pytest.approx(1.2)
-    assert found["probability_any"] == pytest.approx(1.0)
-    assert found["expected_loss"] == pytest.approx(12.0)
-    assert [row["expected_failures"] for row in found["blocks"]] == pytest.approx([0.4, 0.8])
-    assert [(row["count"], row["probability"]) for row in found["exceedance"]] == [
+    assert document["expected_failures"] == pytest.approx(1.2)
+    assert document["probability_any"] == pytest.approx(1.0)
+    assert document["expected_loss"] == pytest.approx(12.0)
+    assert [row["expected_failures"] for row in document["blocks"]] == pytest.approx([0.4, 0.8])
+    assert [(row["count"], row["probability"]) for row in document["exceedance"]] == [
         (1.0, pytest.approx(1.0)),
         (2.0, pytest.approx(0.2)),
     ]
     names = ("failures_p05", "failures_p50", "failures_p95", "loss_p50", "loss_p95")
-    assert [found[name] for name in names] == [1.0, 1.0, 2.0, 10.0, 20.0]
+    assert [document[name] for name in names] == [1.0, 1.0, 2.0, 10.0, 20.0]
 
 
 def test_counts_and_weights(job: Path) -> None:
     once = answered(job, table([0.05], "007", loss=100.0), samples=2)
     many = answered(job, table([0.05], "007", count=3.0, loss=100.0), samples=2)
     heavy = answered(job, table([0.05], "007", weight=2.5, loss=100.0), samples=2)
-    rates = [one.average_annual_failures for one in (once, many, heavy)]
+    rates = [item.average_annual_failures for item in (once, many, heavy)]
     assert rates == pytest.approx([0.005, 0.015, 0.0125])
-    costs = [one.average_annual_loss for one in (once, many, heavy)]
+    costs = [item.average_annual_loss for item in (once, many, heavy)]
     assert costs == pytest.approx([0.5, 1.5, 1.25])
-    assert [one.value for one in many.exceedance["the model's copula"]] == [1.0, 2.0, 3.0]
+    assert [item.value for item in many.exceedance["the model's copula"]] == [1.0, 2.0, 3.0]
     with pytest.raises(InputError, match=r"row 1: count = 1\.5"):
         answered(job, table([0.05], "007", count=1.5))
     with pytest.raises(InputError, match="row 1: loss = -1"):
@@ -233,7 +233,7 @@ def test_limits_of_the_dependence(tmp_path: Path) -> None:
         (APART, binom.sf(np.arange(4), 4, p)),
     ):
         answer = answered(folder, blocks, dependence=law, samples=draws)
-        rates = [one.annual_rate * 100.0 for one in answer.exceedance["the model's copula"]]
+        rates = [item.annual_rate * 100.0 for item in answer.exceedance["the model's copula"]]
         assert rates == pytest.approx(list(shares), abs=error)
 
 
@@ -242,17 +242,17 @@ def test_without_a_stored_dependence_both_bounds_are_given(tmp_path: Path) -> No
     y = [0.3, 0.36, 0.4]
     p = probability(np.array(y), 0.5)
     answer = answered(folder, table(y, "Z9", loss=1.0), dependence=None, samples=50_000)
-    found = answer.as_dict()
-    assert found["annual_rate_any"] is None
-    assert found["joint_law"] == "bounds"
+    document = answer.as_dict()
+    assert document["annual_rate_any"] is None
+    assert document["joint_law"] == "bounds"
     low, high = p.max(), 1.0 - (1.0 - p).prod()
-    assert found["bounds"]["fully_dependent"]["annual_rate_any"] == pytest.approx(0.01 * low)
-    assert found["bounds"]["independent"]["annual_rate_any"] == pytest.approx(0.01 * high)
-    assert found["exceedance"] == []
-    curves = found["exceedance_bounds"]
+    assert document["bounds"]["fully_dependent"]["annual_rate_any"] == pytest.approx(0.01 * low)
+    assert document["bounds"]["independent"]["annual_rate_any"] == pytest.approx(0.01 * high)
+    assert document["exceedance"] == []
+    curves = document["exceedance_bounds"]
     assert curves["fully_dependent"][0]["annual_rate"] == pytest.approx(0.01 * low, rel=0.02)
     assert curves["independent"][0]["annual_rate"] == pytest.approx(0.01 * high, rel=0.02)
-    assert any("bounds" in text for text in found["warnings"])
+    assert any("bounds" in text for text in document["warnings"])
     exact = answered(folder, table(y, "Z9", loss=1.0), dependence=None, expected=True)
     least = np.minimum.outer(p, p) - np.outer(p, p)
     assert exact.any_fails[:, 0] == pytest.approx([low, high])
@@ -266,7 +266,9 @@ def test_parts_of_the_work_change_nothing(
     folder = formats_dir / "openquake_event_based" / "three_realizations"
     blocks = table([0.1, 0.2, 0.3], ["0012", "Z9", "SLIDE-A"], loss=5.0, loss_sigma=0.3)
     seen: list[tuple[int, int]] = []
-    whole = answered(folder, blocks, samples=20, on_progress=lambda *done: seen.append(done))
+    complete = answered(
+        folder, blocks, samples=20, on_progress=lambda *progress: seen.append(progress)
+    )
     assert seen == [(212, 212)] or seen[-1][0] == seen[-1][1]
     monkeypatch.setattr("rbfrag.hazards.losses.PAIRS_AT_ONCE", 7)
 
@@ -276,15 +278,15 @@ def test_parts_of_the_work_change_nothing(
         return iter(results[::-1])
 
     parts = answered(folder, blocks, samples=20, run=backwards)
-    assert parts.any_fails.tolist() == whole.any_fails.tolist()
-    assert parts.loss_variance.tolist() == whole.loss_variance.tolist()
-    one, other = whole.as_dict(), parts.as_dict()
+    assert parts.any_fails.tolist() == complete.any_fails.tolist()
+    assert parts.loss_variance.tolist() == complete.loss_variance.tolist()
+    single, other = complete.as_dict(), parts.as_dict()
     for name in ("exceedance", "loss_exceedance", "blocks"):
-        for row, same in zip(one[name], other[name], strict=True):
+        for row, same in zip(single[name], other[name], strict=True):
             numbers = {key: value for key, value in row.items() if isinstance(value, float)}
             assert numbers == pytest.approx({key: same[key] for key in numbers}, rel=1e-12)
     again = answered(folder, blocks, samples=20, seed=1)
-    assert again.any_fails.tolist() != whole.any_fails.tolist()
+    assert again.any_fails.tolist() != complete.any_fails.tolist()
 
 
 def test_without_samples_only_bounds_are_known(tmp_path: Path) -> None:
@@ -322,13 +324,13 @@ def test_measures_that_the_engine_draws_independently_are_warned_of(
 
 def test_more_samples_than_are_drawn_at_once(job: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     blocks = table([0.36, 0.4, 0.3], "0012", kr_sigma=0.2, loss=10.0, loss_sigma=0.3)
-    whole = answered(job, blocks, samples=3000, component="rotd50")
+    complete = answered(job, blocks, samples=3000, component="rotd50")
     monkeypatch.setattr("rbfrag.hazards.event_counts._VALUES_AT_ONCE", 1 << 10)
     monkeypatch.setattr("rbfrag.hazards.losses.SAMPLES_AT_ONCE", 4000)
     parts = answered(job, blocks, samples=3000, component="rotd50")
-    assert parts.failures == pytest.approx(whole.failures)
-    assert parts.any_fails == pytest.approx(whole.any_fails, abs=4.0 * math.sqrt(0.5 / 3000))
-    assert parts.loss_variance == pytest.approx(whole.loss_variance, rel=0.2)
+    assert parts.failures == pytest.approx(complete.failures)
+    assert parts.any_fails == pytest.approx(complete.any_fails, abs=4.0 * math.sqrt(0.5 / 3000))
+    assert parts.loss_variance == pytest.approx(complete.loss_variance, rel=0.2)
 
 
 def test_blocks_that_nothing_shakes(job: Path) -> None:
@@ -402,20 +404,23 @@ def test_events_agree_with_curves_of_the_same_sources(formats_dir: Path) -> None
         for rate, row in zip(by_curve.tolist(), rows[i * p2.size :], strict=False):
             if rate * 90_000.0 > 20.0:
                 compared += 1
-                own, error = row["average_annual_failures"], row["average_annual_failures_error"]
-                assert abs(own - rate) < 3.0 * error, (site, row, rate)
+                reference, error = (
+                    row["average_annual_failures"],
+                    row["average_annual_failures_error"],
+                )
+                assert abs(reference - rate) < 3.0 * error, (site, row, rate)
     assert compared >= 30
 
 
 @pytest.mark.parametrize(
-    ("one", "other"),
+    ("item", "other"),
     [("one_realization", "engine_made_site_ids"), ("three_realizations", "six_samples")],
 )
-def test_runs_of_the_same_models_agree(formats_dir: Path, one: str, other: str) -> None:
+def test_runs_of_the_same_models_agree(formats_dir: Path, item: str, other: str) -> None:
     answers = []
-    for name in (one, other):
+    for name in (item, other):
         folder = formats_dir / "openquake_event_based" / name
-        sites = read_events(JobFiles.of(folder)).site_ids  # the same places in the same order
+        sites = read_events(job_files(folder)).site_ids  # the same places in the same order
         blocks = table(np.tile([0.1, 0.15, 0.2], len(sites)), np.repeat(sites, 3), loss=1.0)
         answers.append(losses(folder, blocks, component="rotd50"))
     first, second = answers
@@ -428,7 +433,9 @@ def test_runs_of_the_same_models_agree(formats_dir: Path, one: str, other: str) 
     rows = [answer.as_dict()["blocks"] for answer in answers]
     for row, same in zip(*rows, strict=True):
         names = ("average_annual_failures", "average_annual_failures_error")
-        (rate, error), (rate_too, error_too) = ([each[n] for n in names] for each in (row, same))
+        (rate, error), (rate_too, error_too) = (
+            [element[n] for n in names] for element in (row, same)
+        )
         assert abs(rate - rate_too) < 3.0 * math.hypot(error, error_too)
 
 
@@ -451,13 +458,13 @@ def test_kinds_and_their_options(job: Path) -> None:
     """Free-standing blocks with and without a stated restitution beside one that is backed."""
     values = (1.0, -3.0, 0.1, -6.0, 0.0)
     names = method_named("overturning").forms["pgv"].parameters
-    free = model_row(
+    free_standing = model_row(
         name="free", kind="rocking", method="overturning", term="pgv", dependence=None,
         coefficients=dict(zip(names, values, strict=True)),
         covariance=tuple(tuple(0.0 for _ in names) for _ in names), domain={},
     )  # fmt: skip
     with opened_database(job / "models.db", create=True) as engine, engine.begin() as connection:
-        save_model(connection, free)
+        save_model(connection, free_standing)
         save_model(connection, model_row(is_default=True))
     blocks = table([0.4, 0.4, 0.4], "0012", kind=np.array(["", "rocking", "rocking"], dtype=object))
     blocks["restitution"] = np.array([np.nan, 0.9, np.nan])
@@ -472,7 +479,7 @@ def test_kinds_and_their_options(job: Path) -> None:
     ]
     rows = answer.as_dict()["blocks"]
     assert [row["average_annual_failures"] for row in rows] == pytest.approx(
-        [float(weight @ one.probability) for one in alone]
+        [float(weight @ item.probability) for item in alone]
     )
     assert rows[1]["average_annual_failures"] != rows[2]["average_annual_failures"]
     assert answer.as_dict()["kind"] == "toppling, rocking"

@@ -25,8 +25,8 @@ def curve(measure: str = "pgv_m_s") -> HazardCurve:
 def blocks(measure: str, component: str) -> tuple[KernelBlocks, HazardLevel]:
     shaking = HazardLevel.of(curve(measure), component=component)
     model = model_for({}, ("p2", "kr", measure), "toppling")
-    ((_, own),) = KernelBlocks.of(model, shaking.median, NUMBERS, np.zeros(3, dtype=np.intp))
-    return own, shaking
+    ((_, expected),) = KernelBlocks.of(model, shaking.median, NUMBERS, np.zeros(3, dtype=np.intp))
+    return expected, shaking
 
 
 def moved(model: FragilityModel, place: int, step: float) -> FragilityModel:
@@ -38,16 +38,18 @@ def moved(model: FragilityModel, place: int, step: float) -> FragilityModel:
 @pytest.mark.parametrize("component", ["single", "rotd50"])
 @pytest.mark.parametrize("measure", ["pgv_m_s", "pga_g"])
 def test_gradients_are_those_of_differences(measure: str, component: str) -> None:
-    own, shaking = blocks(measure, component)
+    expected, shaking = blocks(measure, component)
     mass = curve_mass([[curve(measure)]], np.ones(1), shaking)
-    found = rates(own, mass, 0.95).gradient
-    for place in range(found.shape[0]):
+    result = rates(expected, mass, 0.95).gradient
+    for place in range(result.shape[0]):
         step = 1e-5
         high, low = (
-            rates(replace(own, model=moved(own.model, place, side * step)), mass, 0.95).rate
+            rates(
+                replace(expected, model=moved(expected.model, place, side * step)), mass, 0.95
+            ).rate
             for side in (1.0, -1.0)
         )
-        np.testing.assert_allclose(found[place], (high - low) / (2.0 * step), rtol=1e-5)
+        np.testing.assert_allclose(result[place], (high - low) / (2.0 * step), rtol=1e-5)
 
 
 def test_the_mass_is_the_rate_of_the_first_level_with_scatter_and_without() -> None:
@@ -89,8 +91,8 @@ def test_rates_of_random_pairs_are_bounded_and_monotone() -> None:
         ) -> np.ndarray:  # fmt: skip
             model = model_for({}, ("p2", "kr", measure), "toppling")
             numbers = {"p2": p2, "kr": kr}
-            ((_, own),) = KernelBlocks.of(model, shaking.median, numbers, site)
-            return rates(own, curve_mass([[curve]], np.ones(1), shaking), 0.95).rate
+            ((_, expected),) = KernelBlocks.of(model, shaking.median, numbers, site)
+            return rates(expected, curve_mass([[curve]], np.ones(1), shaking), 0.95).rate
 
         rate = annual(drawn, kr)
         assert (rate >= 0.0).all()

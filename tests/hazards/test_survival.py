@@ -1,4 +1,4 @@
-"""What standing blocks say of a hazard, against closed forms and numbers worked by hand."""
+"""Evidence of standing blocks on a hazard, against closed forms and numbers worked by hand."""
 
 from __future__ import annotations
 
@@ -16,12 +16,11 @@ from scipy.special import ndtr
 
 from rbfrag.db.model_file import ModelRow
 from rbfrag.errors import InputError
-from rbfrag.hazards.annual_rate import failure_rate
 from rbfrag.hazards.curve import HazardCurve, hazard_curve
 from rbfrag.hazards.curve_file import read_hazard_curves
 from rbfrag.hazards.hazard_rates import hazard
+from rbfrag.hazards.standing_blocks import Age, Standing, failure_rate, weights_given_standing
 from rbfrag.hazards.survival import SurvivalAnswer, survival
-from rbfrag.hazards.survival_probability import Age, Standing, weights_given_standing
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2 as G
 from tests.fragility.conftest import model_row
 
@@ -68,9 +67,9 @@ def test_uncertain_age_is_integrated(mean: float, sd: float) -> None:
             2 * math.pi
         )
 
-    for factor, found in ((1.0, answer.probability_standing), (answer.factor_5_percent, 0.05)):
+    for factor, result in ((1.0, answer.probability_standing), (answer.factor_5_percent, 0.05)):
         expected = quad(share, -12.0, 12.0, args=(factor,), epsabs=0, epsrel=1e-10, limit=200)[0]
-        assert found == pytest.approx(expected, rel=1e-6)
+        assert result == pytest.approx(expected, rel=1e-6)
 
 
 def test_the_age_has_the_mean_and_deviation_that_are_given() -> None:
@@ -82,24 +81,24 @@ def test_the_age_has_the_mean_and_deviation_that_are_given() -> None:
 
 
 def test_hazard_times_the_factor_leaves_what_the_factor_is_of() -> None:
-    asked: dict[str, Any] = {"age_years": YEARS, "age_sd_years": 900.0, "fragility": lognormal}
-    answer = survival(power_law(), **asked)
-    for factor, left in ((answer.factor_5_percent, 0.05), (answer.factor_50_percent, 0.5)):
+    inputs: dict[str, Any] = {"age_years": YEARS, "age_sd_years": 900.0, "fragility": lognormal}
+    answer = survival(power_law(), **inputs)
+    for factor, remaining in ((answer.factor_5_percent, 0.05), (answer.factor_50_percent, 0.5)):
         assert factor is not None
-        again = survival(power_law(factor), **asked)
-        assert again.probability_standing == pytest.approx(left, rel=1e-8)
+        again = survival(power_law(factor), **inputs)
+        assert again.probability_standing == pytest.approx(remaining, rel=1e-8)
 
 
 def test_two_equal_blocks_that_fail_together_are_one() -> None:
     def two(x: FloatArray) -> FloatArray:
         return np.stack([lognormal(x), lognormal(x)])
 
-    one = survival(power_law(), fragility=lognormal, age_years=YEARS)
+    single = survival(power_law(), fragility=lognormal, age_years=YEARS)
     both = survival(power_law(), fragility=two, age_years=YEARS)
     assert both.blocks == 2
     assert both.bounds is not None
     assert both.bounds["fully_dependent"]["probability_standing"] == pytest.approx(
-        one.probability_standing, rel=1e-12
+        single.probability_standing, rel=1e-12
     )
     # P(any) = 1 - (1-P)² in each earthquake, if they are independent in it
     rate = failure_rate(power_law(), lambda x: 1.0 - (1.0 - lognormal(x)) ** 2).annual_rate[0]
@@ -107,13 +106,13 @@ def test_two_equal_blocks_that_fail_together_are_one() -> None:
         math.exp(-rate * YEARS), rel=1e-9
     )
     # the answer is what says least against the hazard, and says so
-    assert both.probability_standing == pytest.approx(one.probability_standing, rel=1e-12)
+    assert both.probability_standing == pytest.approx(single.probability_standing, rel=1e-12)
     assert any("dependence between the blocks is unknown" in text for text in both.warnings)
 
 
-def answered(row: ModelRow, p2: Any, kr: Any, **asked: Any) -> Any:
+def answered(row: ModelRow, p2: Any, kr: Any, **inputs: Any) -> Any:
     return survival(
-        power_law(), p2, kr, kind="toppling", age_years=2e4, component="single", model=row, **asked
+        power_law(), p2, kr, kind="toppling", age_years=2e4, component="single", model=row, **inputs
     )
 
 
@@ -125,8 +124,8 @@ def test_one_block_has_the_rate_of_hazard() -> None:
     )
     assert answer.annual_rate_any == pytest.approx(expected.annual_rate[0], rel=1e-4)
     ends = (expected.ci_high[0], expected.ci_low[0])
-    for found, rate in zip((answer.ci_low, answer.ci_high), ends, strict=True):
-        assert found == pytest.approx(math.exp(-rate * 2e4), rel=1e-3)
+    for result, rate in zip((answer.ci_low, answer.ci_high), ends, strict=True):
+        assert result == pytest.approx(math.exp(-rate * 2e4), rel=1e-3)
     assert answer.ci_low < answer.probability_standing < answer.ci_high
     low, high = answer.factor_5_percent_ci
     assert low is not None
@@ -138,23 +137,23 @@ def test_one_block_has_the_rate_of_hazard() -> None:
 def test_uncertain_block_is_integrated() -> None:
     row = model_row()
     sigma, years = 0.3, 2e4
-    found = answered(row, 3.0, 0.1, kr_sigma=sigma).probability_standing
+    answer = answered(row, 3.0, 0.1, kr_sigma=sigma).probability_standing
     z, weight = np.polynomial.hermite_e.hermegauss(40)
     rates = hazard(
         power_law(), 3.0, 0.1 * np.exp(sigma * z), component="single", model=row
     ).annual_rate
     expected = float(weight @ np.exp(-rates * years) / weight.sum())
-    assert found == pytest.approx(expected, rel=1e-3)
+    assert answer == pytest.approx(expected, rel=1e-3)
     # what is not known of the block is the same in all earthquakes, outside of the exponential
-    assert found > math.exp(-years * float(weight @ rates / weight.sum()))
+    assert answer > math.exp(-years * float(weight @ rates / weight.sum()))
 
 
 def test_several_uncertain_blocks_are_drawn_with_the_seed() -> None:
     row = model_row()
-    one = answered(row, 3.0, 0.1, kr_sigma=0.3, p2_sigma=0.1)
+    single = answered(row, 3.0, 0.1, kr_sigma=0.3, p2_sigma=0.1)
     # the second never fails: what is drawn for it does not matter
     drawn = answered(row, [3.0, 3.0], [0.1, 1e4], kr_sigma=0.3, p2_sigma=0.1, draws=512)
-    assert drawn.probability_standing == pytest.approx(one.probability_standing, rel=0.02)
+    assert drawn.probability_standing == pytest.approx(single.probability_standing, rel=0.02)
     again = answered(row, [3.0, 3.0], [0.1, 1e4], kr_sigma=0.3, p2_sigma=0.1, draws=512)
     other = answered(row, [3.0, 3.0], [0.1, 1e4], kr_sigma=0.3, p2_sigma=0.1, draws=512, seed=1)
     assert again.probability_standing == drawn.probability_standing
@@ -174,9 +173,9 @@ def test_the_copula_lies_between_its_bounds() -> None:
 def test_limits_of_the_copula() -> None:
     nothing = dict.fromkeys(("rho_e", "rho_s", "rho_v", "rho_o"), 0.0)
     all_shared = model_row(dependence={**SHARED, **nothing, "rho_e": 1.0})
-    one = answered(all_shared, 3.0, 0.1)
+    single = answered(all_shared, 3.0, 0.1)
     assert answered(all_shared, [3.0, 3.0], [0.1, 0.1]).probability_standing == pytest.approx(
-        one.probability_standing, rel=1e-6
+        single.probability_standing, rel=1e-6
     )
     # what is forgotten over the least difference in y is not shared by blocks of unlike y
     none_shared = model_row(dependence={**SHARED, **nothing, "rho_o": 1.0, "l_y": 1e-12})
@@ -194,19 +193,19 @@ def test_weights_by_hand() -> None:
         [mean, *curves], fragility=lognormal, age_years=YEARS, weights=[None, *weights]
     )
     stand = [math.exp(-times * RATE * YEARS) for times in (0.5, 1.0, 4.0)]
-    whole = sum(w * s for w, s in zip(weights, stand, strict=True))
-    assert answer.probability_standing == pytest.approx(whole, rel=1e-6)
+    total = sum(w * s for w, s in zip(weights, stand, strict=True))
+    assert answer.probability_standing == pytest.approx(total, rel=1e-6)
     first, *branches = answer.branches
     assert (first.name, first.weight, first.weight_given_standing) == ("mean", None, None)
     for branch, w, s in zip(branches, weights, stand, strict=True):
         assert branch.weight == pytest.approx(w, rel=1e-12)
         assert branch.probability_standing == pytest.approx(s, rel=1e-6)
-        assert branch.weight_given_standing == pytest.approx(w * s / whole, rel=1e-6)
+        assert branch.weight_given_standing == pytest.approx(w * s / total, rel=1e-6)
     assert [branch.name for branch in branches] == ["rlz-000", "rlz-001", "rlz-002"]
     factor = answer.factor_5_percent
     assert factor is not None
-    left = sum(w * s**factor for w, s in zip(weights, stand, strict=True))
-    assert left == pytest.approx(0.05, rel=1e-6)
+    remaining = sum(w * s**factor for w, s in zip(weights, stand, strict=True))
+    assert remaining == pytest.approx(0.05, rel=1e-6)
 
 
 def test_weights_where_no_hazard_lets_the_blocks_stand() -> None:
@@ -260,18 +259,18 @@ def test_blocks_that_nothing_fells_have_no_factor() -> None:
     ],
 )  # fmt: skip
 def test_rejections(changes: dict[str, Any], words: str) -> None:
-    asked = {"curves": power_law(), "fragility": lognormal, "age_years": YEARS, **changes}
-    if asked["fragility"] is None:
-        asked |= {"model": model_row(), "kind": "toppling"}
+    inputs = {"curves": power_law(), "fragility": lognormal, "age_years": YEARS, **changes}
+    if inputs["fragility"] is None:
+        inputs |= {"model": model_row(), "kind": "toppling"}
     with pytest.raises(InputError, match=words.replace("(", r"\(")):
-        survival(asked.pop("curves"), **asked)
+        survival(inputs.pop("curves"), **inputs)
 
 
 def test_curves_of_two_sites_are_rejected() -> None:
     x = np.array([0.1, 1.0])
-    here, there = (hazard_curve("pgv_m_s", x, [1e-2, 1e-4], site=site) for site in ("A", "B"))
+    local, there = (hazard_curve("pgv_m_s", x, [1e-2, 1e-4], site=site) for site in ("A", "B"))
     with pytest.raises(InputError, match="2 sites"):
-        survival([here, there], fragility=lognormal, age_years=YEARS)
+        survival([local, there], fragility=lognormal, age_years=YEARS)
 
 
 def test_more_than_the_ranges_and_the_ends_is_told() -> None:
@@ -281,11 +280,11 @@ def test_more_than_the_ranges_and_the_ends_is_told() -> None:
     answer = survival(
         short, 300.0, 1.0, kind="toppling", age_years=YEARS, model=row, component="single"
     )
-    told = " ".join(answer.warnings)
-    assert "the hazard curve begins at" in told
-    assert "the hazard curve ends at" in told
-    assert "outside the fitted range" in told
-    assert "backed by a rock face" in told
+    document = " ".join(answer.warnings)
+    assert "the hazard curve begins at" in document
+    assert "the hazard curve ends at" in document
+    assert "outside the fitted range" in document
+    assert "backed by a rock face" in document
 
 
 def test_a_free_block_of_los_angeles(formats_dir: Path) -> None:

@@ -61,8 +61,8 @@ def test_a_member_reads_as_the_file(tmp_path: Path, records: Path) -> None:
 
 
 def test_all_members(records: Path) -> None:
-    found = [(motion.source_file, motion.trace_index) for motion in read_motions(records)]
-    assert found == [
+    traces = [(motion.source_file, motion.trace_index) for motion in read_motions(records)]
+    assert traces == [
         ("records.zip/chan001.v2", 0),
         ("records.zip/chan001.v2", 1),
         ("records.zip/sub/north.asc", 0),
@@ -162,6 +162,6 @@ def test_what_cannot_be_unpacked(tmp_path: Path) -> None:
         zipped(tmp_path / "nested.zip", {"inner.zip": inner.getvalue()})
     )
     raw = zipped(tmp_path / "cut.zip", {"a.v2": V2}).read_bytes()
-    for kept in (4, 30, len(raw) // 2, len(raw) - 5):
-        (tmp_path / "cut.zip").write_bytes(raw[:kept])
+    for size in (4, 30, len(raw) // 2, len(raw) - 5):
+        (tmp_path / "cut.zip").write_bytes(raw[:size])
         assert "the zip is damaged" in rejection(tmp_path / "cut.zip")

@@ -14,9 +14,9 @@ from tests.motions.written import AT2_SAMPLING, at2, v2a
 SAMPLES = [f"{0.001 * i:.5E}" for i in range(1, 13)]
 
 
-def rejection(path: Path, **stated: object) -> MotionFileError:
+def rejection(path: Path, **options: object) -> MotionFileError:
     with pytest.raises(MotionFileError) as caught:
-        read_motions(path, **stated)  # type: ignore[arg-type]
+        read_motions(path, **options)  # type: ignore[arg-type]
     assert str(path) in str(caught.value)
     assert "\n" not in str(caught.value)
     return caught.value
@@ -81,19 +81,19 @@ def test_content_decides_not_the_name(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("sampling", AT2_SAMPLING)
-@pytest.mark.parametrize("stated", [11, 13])
-def test_at2_count_disagrees(tmp_path: Path, sampling: str, stated: int) -> None:
-    error = rejection(written(tmp_path, at2(SAMPLES, 0.01, sampling=sampling, npts=stated)))
+@pytest.mark.parametrize("count", [11, 13])
+def test_at2_count_disagrees(tmp_path: Path, sampling: str, count: int) -> None:
+    error = rejection(written(tmp_path, at2(SAMPLES, 0.01, sampling=sampling, npts=count)))
     assert error.line == 4
-    assert f"{stated} samples" in error.reason
+    assert f"{count} samples" in error.reason
     assert "12 follow" in error.reason
     assert "export" in error.reason
 
 
 def test_at2_truncated_at_every_line(tmp_path: Path) -> None:
     lines = at2(SAMPLES, 0.01).splitlines(keepends=True)
-    for kept in range(len(lines)):
-        rejection(written(tmp_path, "".join(lines[:kept])))
+    for number in range(len(lines)):
+        rejection(written(tmp_path, "".join(lines[:number])))
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,7 @@ from rbfrag.errors import InputError
 from rbfrag.motions.direction import companion, is_downward_name, is_vertical_name, upward
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.processing import processed
-from rbfrag.motions.text.times import first_sample_time
+from rbfrag.motions.text import first_sample_time
 from rbfrag.solver.toppling_run import respond
 from tests.synthetic import shaking
 
@@ -40,8 +40,8 @@ def test_downward_is_turned_once(name: str) -> None:
 
 @pytest.mark.parametrize("name", ["UP", "V", "Z", "HNZ", "360", "", "DOWNEY"])
 def test_others_are_left(name: str) -> None:
-    given = motion(component=name)
-    assert upward(given) is given
+    labelled = motion(component=name)
+    assert upward(labelled) is labelled
 
 
 def test_down_and_its_mirror_image_give_one_answer() -> None:
@@ -64,7 +64,7 @@ def test_down_and_its_mirror_image_give_one_answer() -> None:
          "0.5 s after"),
         (motion(start_time=START), motion(2, start_time=START - timedelta(seconds=3)),
          "3 s before"),
-        (processed(motion()), motion(2), "1000 samples before the horizontal component and 0"),
+        (processed(motion()), motion(2), "1000 samples before the horizontal and 0"),
     ],
 )  # fmt: skip
 def test_apart(horizontal: GroundMotion, vertical: GroundMotion, words: str) -> None:

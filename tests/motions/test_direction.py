@@ -1,4 +1,4 @@
-"""What component names say about direction."""
+"""Directions from component names."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is exported reads back bit for bit, with every label; what was changed since is noticed."""
+"""Exported motions read back bit for bit, with every label; later changes are noticed."""
 
 from __future__ import annotations
 
@@ -14,10 +14,9 @@ from hypothesis.extra import numpy as hnp
 
 from rbfrag.errors import InputError, MotionFileError
 from rbfrag.motions.direction import upward
-from rbfrag.motions.export import export_motions
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.processing import processed
-from rbfrag.motions.readers import read_motion, read_motions
+from rbfrag.motions.readers import export_motions, read_motion, read_motions
 from tests.synthetic import shaking
 
 LABELS = (
@@ -136,8 +135,8 @@ def test_changed(tmp_path: Path, old: str, new: str, words: str) -> None:
 def test_without_its_hash_a_changed_file_is_read(tmp_path: Path) -> None:
     path = tmp_path / "m.csv"
     export_motions([GroundMotion(np.array([0.0, 0.25, 0.0]), 0.01)], path)
-    kept = [line for line in path.read_text().splitlines() if "sha256" not in line]
-    path.write_text("\n".join(kept).replace("0.25", "0.5") + "\n")
+    lines = [line for line in path.read_text().splitlines() if "sha256" not in line]
+    path.write_text("\n".join(lines).replace("0.25", "0.5") + "\n")
     assert read_motion(path).pga_g == 0.5
 
 

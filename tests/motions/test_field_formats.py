@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 
 from rbfrag.errors import MotionFileError, UnitNotStatedError
 from rbfrag.motions.ground_motion import GroundMotion
+from rbfrag.motions.header_check import doubts
 from rbfrag.motions.readers import read_motions
-from rbfrag.motions.text.header_check import doubts
 from rbfrag.motions.units import unit_in_g
 from tests.motions import written_by_networks as written
 from tests.synthetic import shaking
@@ -29,10 +29,10 @@ TABLE = [
 ]
 
 
-def read(folder: Path, text: str, **stated: object) -> list[GroundMotion]:
+def read(folder: Path, text: str, **options: object) -> list[GroundMotion]:
     path = folder / "2001-ABC.acc.bbp"
     path.write_text(text)
-    return read_motions(path, **stated)  # type: ignore[arg-type]
+    return read_motions(path, **options)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(
@@ -67,12 +67,12 @@ def test_components_that_are_copies_are_remarked_upon(formats_dir: Path) -> None
 
 def test_afad_preamble(tmp_path: Path) -> None:
     text = written.esm_asc(["1.0", "-2.0", "0.5"], 0.01)
-    (whole,) = read(tmp_path, text)
+    (complete,) = read(tmp_path, text)
     (motion,) = read(tmp_path, written.AFAD_PREAMBLE + text)
-    assert motion.sha256 == whole.sha256
+    assert motion.sha256 == complete.sha256
     assert motion.file_format == "ESM ASC"
     # what stands before the header is of the archive's own filter, not the header's
-    assert motion.is_corrected is whole.is_corrected is None
+    assert motion.is_corrected is complete.is_corrected is None
     assert not motion.remarks
 
 
@@ -135,9 +135,9 @@ def test_scec(
 @pytest.mark.parametrize("unit", ["cm/s", "m/s", "cm"])
 def test_scec_velocities(tmp_path: Path, columns: str, unit: str) -> None:
     text = written.scec_bbp(TABLE, 0.025, columns=columns, unit=unit)
-    for stated in (None, "cm/s2"):
+    for units in (None, "cm/s2"):
         with pytest.raises(MotionFileError, match=f"line .*hold {unit}, no acceleration"):
-            read(tmp_path, text, units=stated)
+            read(tmp_path, text, units=units)
 
 
 def test_scec_velocity_in_words(tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""What a file states twice agrees with its samples, or the file is rejected with both numbers."""
+"""A header agrees with its samples, or the file is rejected with both numbers."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from hypothesis import strategies as st
 from rbfrag.campaign.add_motions import add_motions
 from rbfrag.errors import MotionFileError
 from rbfrag.motions.ground_motion import GroundMotion
+from rbfrag.motions.header_check import doubts
 from rbfrag.motions.polarity import FloatArray
 from rbfrag.motions.readers import read_motions
-from rbfrag.motions.text.header_check import doubts
 from tests.motions import written_by_networks as written
 from tests.motions.written import v2a
 from tests.motions.written_by_networks import Channels
@@ -39,7 +39,7 @@ def table(values: FloatArray) -> list[list[str]]:
     return [three(np.array(row)) for row in zip(values, 0.5 * values, -0.2 * values, strict=True)]
 
 
-def each(
+def different_channels(
     names: list[str], write: Callable[[FloatArray], list[str]], values: FloatArray
 ) -> Channels:
     """Channels that differ: equal ones would be remarked upon."""
@@ -49,16 +49,22 @@ def each(
 
 
 MAKE: dict[str, Callable[[FloatArray, float], str]] = {
-    "GeoNet V2A": lambda values, dt: v2a(each(["N28W", "N62E", "UP"], three, values), dt),
+    "GeoNet V2A": lambda values, dt: v2a(
+        different_channels(["N28W", "N62E", "UP"], three, values), dt
+    ),
     "CSMIP/CDMG V2": lambda values, dt: written.csmip_v2(
-        each(["H1", "H2", "Up"], three, values), dt
+        different_channels(["H1", "H2", "Up"], three, values), dt
     ),
     "COSMOS V1c/V2c": lambda values, dt: written.cosmos(three(values), dt),
     "CDMG V1 series": lambda values, dt: written.csmip_v1(
-        each(["360 Deg", "Up", "90 Deg"], six, values), dt
+        different_channels(["360 Deg", "Up", "90 Deg"], six, values), dt
     ),
-    "CDMG V1": lambda values, dt: written.cdmg_v1(each(["EW", "NS", "V"], three, values), dt),
-    "BHRC V1": lambda values, dt: written.bhrc_v1(each(["L1", "V2", "T3"], six, values), dt),
+    "CDMG V1": lambda values, dt: written.cdmg_v1(
+        different_channels(["EW", "NS", "V"], three, values), dt
+    ),
+    "BHRC V1": lambda values, dt: written.bhrc_v1(
+        different_channels(["L1", "V2", "T3"], six, values), dt
+    ),
     "K-NET/KiK-net ASCII": lambda values, dt: written.knet(
         [int(1e4 * value) for value in values], round(1.0 / dt)
     ),
@@ -74,7 +80,7 @@ MAKE: dict[str, Callable[[FloatArray, float], str]] = {
 }
 
 
-def made(name: str) -> str:
+def file_text(name: str) -> str:
     return MAKE[name](SHAKING, 0.02)
 
 
@@ -157,48 +163,48 @@ def changed(text: str, pattern: str, new: str) -> str:
     return text[:start] + after + text[end:]
 
 
-def read(folder: Path, text: str, **stated: object) -> list[GroundMotion]:
+def read(folder: Path, text: str, **options: object) -> list[GroundMotion]:
     path = folder / "record"
     path.write_text(text)
-    return read_motions(path, **stated)  # type: ignore[arg-type]
+    return read_motions(path, **options)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("name", MAKE)
 def test_an_honest_file_says_nothing(tmp_path: Path, name: str) -> None:
-    for motion in read(tmp_path, made(name)):
+    for motion in read(tmp_path, file_text(name)):
         assert motion.npts == NPTS
         assert motion.dt_s == pytest.approx(0.02)
         assert not doubts(motion.remarks)
 
 
-@pytest.mark.parametrize(("name", "what", "pattern", "new"), CASES)
+@pytest.mark.parametrize(("name", "subject", "pattern", "new"), CASES)
 def test_a_mistake_is_rejected(
-    tmp_path: Path, name: str, what: str, pattern: str, new: str
+    tmp_path: Path, name: str, subject: str, pattern: str, new: str
 ) -> None:
-    text = changed(made(name), pattern, new)
+    text = changed(file_text(name), pattern, new)
     with pytest.raises(MotionFileError) as caught:
         read(tmp_path, text)
-    option = "dt_s" if what in {"dt", "duration"} else "units"
+    option = "dt_s" if subject in {"dt", "duration"} else "units"
     assert len(re.findall(r"\d[\d.]*", caught.value.reason)) >= 2
     # a column of times that contradicts its header needs no duration to tell
     assert option in caught.value.fields or "time " in caught.value.reason
 
 
 @pytest.mark.parametrize(
-    ("name", "what", "pattern", "new"), [case for case in CASES if case[1] in {"dt", "duration"}]
+    ("name", "subject", "pattern", "new"), [case for case in CASES if case[1] in {"dt", "duration"}]
 )
 def test_a_stated_interval_overrides(
-    tmp_path: Path, name: str, what: str, pattern: str, new: str
+    tmp_path: Path, name: str, subject: str, pattern: str, new: str
 ) -> None:
-    text = changed(made(name), pattern, new)
-    whole = read(tmp_path, made(name))
-    if name in {"K-NET/KiK-net ASCII", "CWB dat"} and what == "duration":
+    text = changed(file_text(name), pattern, new)
+    unchanged = read(tmp_path, file_text(name))
+    if name in {"K-NET/KiK-net ASCII", "CWB dat"} and subject == "duration":
         # the duration is the count of samples: dt cannot mend it
         with pytest.raises(MotionFileError, match="samples, but 400 follow"):
             read(tmp_path, text, dt_s=0.02)
         return
     motions = read(tmp_path, text, dt_s=0.02)
-    assert [motion.sha256 for motion in motions] == [motion.sha256 for motion in whole]
+    assert [motion.sha256 for motion in motions] == [motion.sha256 for motion in unchanged]
     assert all(motion.dt_s == pytest.approx(0.02) for motion in motions)
     assert doubts(motions[0].remarks)
     with pytest.raises(MotionFileError, match="omit dt_s"):
@@ -212,15 +218,15 @@ def test_a_stated_interval_overrides(
 )  # fmt: skip
 def test_a_stated_unit_overrides(tmp_path: Path, name: str, unit: str | None) -> None:
     (pattern, new) = next(case[2:] for case in CASES if case[:2] == (name, "unit"))
-    text = changed(made(name), pattern, new)
+    text = changed(file_text(name), pattern, new)
     if unit is None:
         # no option names a tenth of g: only the header can be corrected
         with pytest.raises(MotionFileError, match="correct the header"):
             read(tmp_path, text)
         return
-    whole = read(tmp_path, made(name))
+    motions = read(tmp_path, file_text(name))
     motion = read(tmp_path, text, units=unit)[0]
-    assert motion.sha256 == whole[0].sha256
+    assert motion.sha256 == motions[0].sha256
     assert "is what was stated" in doubts(motion.remarks)[0]
     assert motion.stated_unit == unit
     with pytest.raises(MotionFileError, match="omit units"):
@@ -229,7 +235,7 @@ def test_a_stated_unit_overrides(tmp_path: Path, name: str, unit: str | None) ->
 
 def test_what_is_stated_as_the_header_has_it_is_kept(tmp_path: Path) -> None:
     file = tmp_path / "record.asc"
-    text = changed(made("ESM ASC"), r"PGA_CM/S\^2: (\S+)", "x3")
+    text = changed(file_text("ESM ASC"), r"PGA_CM/S\^2: (\S+)", "x3")
     file.write_text(changed(text, r"\nDURATION_S: (\S+)", "x2"))
     report = add_motions(file, db=tmp_path / "one.db", units="cm/s2", dt_s=0.02)
     assert len(report.added) == 1
@@ -238,7 +244,7 @@ def test_what_is_stated_as_the_header_has_it_is_kept(tmp_path: Path) -> None:
 
 def test_an_interval_of_one_component(tmp_path: Path) -> None:
     # neither duration nor times say it, only the other components
-    text = made("GeoNet V2A").replace("Duration", "Lasting")
+    text = file_text("GeoNet V2A").replace("Duration", "Lasting")
     text = changed(text, r"data at (\S+) sec", "x2")
     with pytest.raises(MotionFileError, match=r"N28W has dt = 0.04 s, but N62E 0.02 s"):
         read(tmp_path, text)
@@ -259,21 +265,21 @@ def test_a_missing_component_is_told(tmp_path: Path, text: str, held: str) -> No
         assert held in doubts(motion.remarks)[0]
 
 
-@pytest.mark.parametrize(("factor", "told"), [(1.02, False), (0.8, True), (1.7, True)])
-def test_a_peak_that_is_a_little_off(tmp_path: Path, factor: float, told: bool) -> None:
-    text = changed(made("ESM ASC"), r"PGA_CM/S\^2: (\S+)", f"x{factor}")
+@pytest.mark.parametrize(("factor", "is_noted"), [(1.02, False), (0.8, True), (1.7, True)])
+def test_a_peak_that_is_a_little_off(tmp_path: Path, factor: float, is_noted: bool) -> None:
+    text = changed(file_text("ESM ASC"), r"PGA_CM/S\^2: (\S+)", f"x{factor}")
     (motion,) = read(tmp_path, text)
-    assert bool(doubts(motion.remarks)) is told
+    assert bool(doubts(motion.remarks)) is is_noted
 
 
-@pytest.mark.parametrize(("factor", "told"), [(0.995, False), (1.03, True)])
-def test_a_duration_that_is_a_little_off(tmp_path: Path, factor: float, told: bool) -> None:
-    text = changed(made("GeoNet V2A"), r"Duration (\S+) sec", f"x{factor}")
-    assert bool(doubts(read(tmp_path, text)[0].remarks)) is told
+@pytest.mark.parametrize(("factor", "is_noted"), [(0.995, False), (1.03, True)])
+def test_a_duration_that_is_a_little_off(tmp_path: Path, factor: float, is_noted: bool) -> None:
+    text = changed(file_text("GeoNet V2A"), r"Duration (\S+) sec", f"x{factor}")
+    assert bool(doubts(read(tmp_path, text)[0].remarks)) is is_noted
 
 
 def test_the_peak_before_correction_does_not_count(tmp_path: Path) -> None:
-    text = made("CSMIP/CDMG V2")
+    text = file_text("CSMIP/CDMG V2")
     assert "Uncor Max" in text
     text = changed(text, r"Uncor Max  =\s+(\S+) g", "x10")
     assert not doubts(read(tmp_path, text)[0].remarks)
@@ -281,16 +287,16 @@ def test_the_peak_before_correction_does_not_count(tmp_path: Path) -> None:
 
 def test_a_peak_that_nobody_filled_in(tmp_path: Path) -> None:
     for new in ("", "0.000", "-999.00", "None"):
-        text = re.sub(r"(PGA_CM/S\^2:) \S+", rf"\1 {new}", made("ESM ASC"))
+        text = re.sub(r"(PGA_CM/S\^2:) \S+", rf"\1 {new}", file_text("ESM ASC"))
         assert not doubts(read(tmp_path, text)[0].remarks)
 
 
 def test_adding_says_it(tmp_path: Path) -> None:
     file = tmp_path / "record.asc"
-    file.write_text(changed(made("ESM ASC"), r"PGA_CM/S\^2: (\S+)", "x1.3"))
+    file.write_text(changed(file_text("ESM ASC"), r"PGA_CM/S\^2: (\S+)", "x1.3"))
     report = add_motions(file, db=tmp_path / "one.db")
     assert "the largest sample" in report.warnings[0]
-    file.write_text(changed(made("ESM ASC"), r"UNITS: (\S+)", "m/s^2"))
+    file.write_text(changed(file_text("ESM ASC"), r"UNITS: (\S+)", "m/s^2"))
     assert "units" in add_motions(file, db=tmp_path / "two.db").failed[0].reason
     report = add_motions(file, db=tmp_path / "two.db", units="cm/s2")
     assert len(report.added) == 1

@@ -116,10 +116,10 @@ def test_measures_are_the_extremes_of_an_independent_integration(
     v, d = fine_history(motion, parts=40)
     m = motion.measures
     assert m.pga_g == np.max(np.abs(a))
-    for found, points, rate in ((m.pgv_m_s, v, m.pga_g * G), (m.pgd_m, d, m.pgv_m_s)):
+    for peak, points, rate in ((m.pgv_m_s, v, m.pga_g * G), (m.pgd_m, d, m.pgv_m_s)):
         largest = float(np.max(np.abs(points)))
         # The grid misses an extreme by at most one piece of the steepest change.
-        assert largest - 1e-10 <= found <= largest + rate * 0.5 / 40 + 1e-10
+        assert largest - 1e-10 <= peak <= largest + rate * 0.5 / 40 + 1e-10
     assert m.final_velocity_m_s == pytest.approx(v[-1], abs=1e-10)
     assert m.final_displacement_m == pytest.approx(d[-1], abs=1e-10)
 

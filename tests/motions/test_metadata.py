@@ -23,7 +23,7 @@ def test_every_column(tmp_path: Path) -> None:
         tmp_path,
         "notes,file,trace_index,event_id,units,is_vertical,companion_group,magnitude,processing,"
         "earthquake,year,station,component,dt_s\n"
-        'ignored,"a/b, c.txt",2,loma-prieta,gal,1,pair 1,6.93,corrected,"Loma Prieta, CA",1989,'
+        'by tape,"a/b, c.txt",2,loma-prieta,gal,1,pair 1,6.93,corrected,"Loma Prieta, CA",1989,'
         "CLS,UP,0.005\n",
     )
     traced = read_metadata(path).trace(tmp_path / "a" / "b, c.txt", 2)
@@ -39,7 +39,8 @@ def test_every_column(tmp_path: Path) -> None:
     assert (traced.station, traced.component) == ("CLS", "UP")
     assert traced.dt_s == 0.005
     assert traced.line == 2
-    assert read_metadata(path).not_read == ("notes",)
+    assert traced.attributes == {"notes": "by tape"}
+    assert read_metadata(path).not_read == ()
 
 
 def test_a_column_that_is_nearly_one_is_rejected(tmp_path: Path) -> None:
@@ -49,7 +50,7 @@ def test_a_column_that_is_nearly_one_is_rejected(tmp_path: Path) -> None:
             read_metadata(table(tmp_path, f"file,{wrong}\na.AT2,1\n"))
     read = read_metadata(table(tmp_path, "file,unit,operator,rsn,rank\na.AT2,gal,me,1,2\n"))
     assert read.rows[0].units == "gal"
-    assert read.not_read == ("operator", "rsn", "rank")
+    assert read.rows[0].attributes == {"operator": "me", "rsn": "1", "rank": "2"}
 
 
 def test_words_that_do_not_tell_of_the_processing_are_rejected(tmp_path: Path) -> None:
@@ -173,3 +174,64 @@ def test_any_text_is_read_or_rejected(tmp_path: Path, text: str) -> None:
         rejection = ""
         assert metadata.file(tmp_path / "not there") == []
     assert not rejection or rejection.startswith(str(path))
+
+
+SITE = (
+    "file,event_id,companion_group,mechanism,depth_km,network,lat,lon,rjb_km,rrup_km,repi_km,vs30"
+)
+
+
+def test_metadata_of_earthquake_and_site(tmp_path: Path) -> None:
+    path = table(tmp_path, f"{SITE},rsn\na.AT2,e,g,Strike slip,8.5,CE,37.1,-121.5,12,13,20,450,7\n")
+    (row,) = read_metadata(path).rows
+    assert (row.mechanism, row.depth_km) == ("strike-slip", 8.5)
+    assert row.site == {
+        "network": "CE", "lat": 37.1, "lon": -121.5, "rjb_km": 12.0, "rrup_km": 13.0,
+        "repi_km": 20.0, "vs30_m_s": 450.0,
+    }  # fmt: skip
+    assert row.attributes == {"rsn": "7"}
+
+
+@pytest.mark.parametrize(
+    ("column", "cell", "words"),
+    [
+        ("lat", "91", "lat '91' must be from -90 to 90"),
+        ("lon", "-181", "lon '-181' must be from -180 to 360"),
+        ("rjb_km", "-1", "rjb_km '-1' must be at least 0"),
+        ("vs30_m_s", "0", "vs30_m_s '0' must be above 0"),
+        ("vs30_m_s", "rock", "vs30_m_s 'rock' must be above 0"),
+        ("depth_km", "8000", "depth_km '8000' must be from -10 to 800"),
+        ("mechanism", "oblique", "mechanism 'oblique' must be unspecified or strike-slip or"),
+    ],
+)
+def test_values_out_of_range_are_rejected(
+    tmp_path: Path, column: str, cell: str, words: str
+) -> None:
+    path = table(tmp_path, f"file,event_id,{column}\na.AT2,e,\nb.AT2,e,{cell}\n")
+    with pytest.raises(MotionFileError, match=words) as caught:
+        read_metadata(path)
+    assert caught.value.line == 3
+
+
+def test_values_of_one_earthquake_or_recording_agree(tmp_path: Path) -> None:
+    head = "file,event_id,companion_group,mechanism,vs30_m_s,npts\n"
+    path = table(tmp_path, f"{head}a,e,g,,450,3\nb,e,h,reverse,300,4\nc,e,g,,400,5\n")
+    with pytest.raises(
+        MotionFileError, match=r"recording 'g' is 400.* but 450.* line 2: correct"
+    ) as caught:
+        read_metadata(path)
+    assert caught.value.line == 4
+    path = table(tmp_path, f"{head}a,e,g,normal,,\nb,e,h,reverse,,\n")
+    with pytest.raises(MotionFileError, match="mechanism of the earthquake 'e' is reverse, but"):
+        read_metadata(path)
+    with pytest.raises(MotionFileError, match="mechanism requires the event_id"):
+        read_metadata(table(tmp_path, "file,mechanism\na.AT2,reverse\n"))
+
+
+def test_columns_that_differ_between_components_are_no_attributes(tmp_path: Path) -> None:
+    rows = "a,e,g,3,7\nb,e,g,4,7\nc,e,h,5,8\n"
+    read = read_metadata(table(tmp_path, f"file,event_id,companion_group,npts,rsn\n{rows}"))
+    assert read.not_read == ("npts",)
+    assert [read.file(tmp_path / name)[0].attributes for name in "abc"] == [
+        {"rsn": "7"}, {"rsn": "7"}, {"rsn": "8"},
+    ]  # fmt: skip

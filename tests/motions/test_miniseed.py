@@ -80,7 +80,7 @@ def test_several_stations_are_remarked_upon(tmp_path: Path) -> None:
 @pytest.mark.parametrize("channel", ["BHZ", "HHE", "EHZ", "LDO"])
 def test_channels_of_other_quantities(tmp_path: Path, channel: str) -> None:
     path = written(tmp_path, miniseed(COUNTS, channel=channel))
-    with pytest.raises(MotionFileError, match=f"{channel} is not an accelerometer"):
+    with pytest.raises(MotionFileError, match=f"{channel}: not an accelerometer"):
         read_motions(path, gain=GAIN)
 
 
@@ -95,8 +95,8 @@ def test_a_gap(tmp_path: Path) -> None:
 
 
 def test_a_file_that_was_cut(tmp_path: Path) -> None:
-    whole = miniseed(COUNTS, record_bytes=512)
-    path = written(tmp_path, whole[:-200])
+    complete = miniseed(COUNTS, record_bytes=512)
+    path = written(tmp_path, complete[:-200])
     with pytest.raises(MotionFileError, match="truncated or damaged") as rejected:
         read_motions(path, gain=GAIN)
     assert rejected.value.fields == ("allow_partial",)
@@ -104,17 +104,17 @@ def test_a_file_that_was_cut(tmp_path: Path) -> None:
     assert motion.is_partial
     assert "left out" in motion.remarks[-1]
     assert 0 < motion.npts < COUNTS.size
-    kept = COUNTS[: motion.npts]
-    assert motion.acceleration_g == pytest.approx(in_g(kept, GAIN), rel=1e-12, abs=1e-15)
+    expected = COUNTS[: motion.npts]
+    assert motion.acceleration_g == pytest.approx(in_g(expected, GAIN), rel=1e-12, abs=1e-15)
 
 
 def test_a_damaged_record(tmp_path: Path) -> None:
     # version 3 has a checksum; in version 2 the differences must lead to the last sample
     for version, encoding in ((3, "INT32"), (2, "STEIM1"), (2, "STEIM2")):
-        whole = bytearray(miniseed(COUNTS, record_bytes=512, version=version, encoding=encoding))
-        whole[700] ^= 0x01
+        content = bytearray(miniseed(COUNTS, record_bytes=512, version=version, encoding=encoding))
+        content[700] ^= 0x01
         with pytest.raises(MotionFileError, match="truncated or damaged"):
-            read_motions(written(tmp_path, bytes(whole)), gain=GAIN)
+            read_motions(written(tmp_path, bytes(content)), gain=GAIN)
 
 
 def test_what_is_stated_must_fit(tmp_path: Path) -> None:
@@ -162,3 +162,28 @@ def test_a_gain_that_nobody_needs(tmp_path: Path) -> None:
     path.write_text("# Time (s),Acceleration (g)\n0,0\n0.01,1\n0.02,0\n")
     report = add_motions(path, db=tmp_path / "one.db", gain=GAIN)
     assert "omit gain" in report.failed[0].reason
+
+
+def test_channels_are_chosen(tmp_path: Path) -> None:
+    codes = ("HNE", "HNZ", "ENE", "BHZ")
+    pieces = [miniseed(COUNTS * (i + 1), channel=code) for i, code in enumerate(codes)]
+    path = written(tmp_path, *pieces)
+    for channel, read in (
+        (None, ["ENE", "HNE", "HNZ"]),
+        ("HN?", ["HNE", "HNZ"]),
+        ("ene, hnz", ["ENE", "HNZ"]),
+        ("*Z,ENE", ["ENE", "HNZ"]),
+    ):
+        motions = read_motions(path, gain=GAIN, channel=channel)
+        assert sorted(motion.component for motion in motions) == read
+    assert read_motion(path, gain=GAIN, channel="HNZ").component == "HNZ"
+    report = add_motions(path, db=tmp_path / "a.db", gain=GAIN, channel="HN?")
+    assert len(report.added) == 2
+    with pytest.raises(MotionFileError, match=r"no channel HX\?: the file has .*HNE"):
+        read_motions(path, gain=GAIN, channel="HX?")
+    with pytest.raises(MotionFileError, match="BHZ: not an accelerometer"):
+        read_motions(path, gain=GAIN, channel="BHZ")
+    text = tmp_path / "a.txt"
+    text.write_text("0.1\n0.2\n0.1\n0\n0.1\n0.2\n")
+    with pytest.raises(MotionFileError, match="has no channel codes: omit channel"):
+        read_motions(text, units="g", dt_s=0.01, channel="HNE")

@@ -32,16 +32,16 @@ def test_cut_after_every_line(tmp_path: Path, name: str) -> None:
     lines = WRITTEN[name]().splitlines(keepends=True)
     path = tmp_path / "record"
     path.write_text("".join(lines))
-    whole = read_motions(path, units=UNITS[name])
-    for kept in range(1, len(lines)):
-        path.write_text("".join(lines[:kept]))
+    complete = read_motions(path, units=UNITS[name])
+    for number in range(1, len(lines)):
+        path.write_text("".join(lines[:number]))
         try:
             motions = read_motions(path, units=UNITS[name])
         except MotionFileError:
             continue
         # nothing but a closing line, or whole channels, may be missing
         for motion in motions:
-            assert motion.sha256 == whole[motion.trace_index].sha256
+            assert motion.sha256 == complete[motion.trace_index].sha256
 
 
 @pytest.mark.parametrize("name", WRITTEN)
@@ -198,8 +198,8 @@ def test_a_blank_that_numpy_does_not_know(tmp_path: Path) -> None:
     text = WRITTEN["COSMOS V1c/V2c"]()
     path = tmp_path / "record"
     path.write_text(text)
-    (whole,) = read_motions(path)
+    (complete,) = read_motions(path)
     at = text.index("            1.0")
     path.write_text(f"{text[:at]}\x1c{text[at + 1 :]}", encoding="latin-1")
     (motion,) = read_motions(path, allow_partial=True)
-    assert motion.sha256 == whole.sha256
+    assert motion.sha256 == complete.sha256

@@ -18,7 +18,7 @@ from tests.motions.written import at2, v2a
 from tests.synthetic import shaking
 
 SAMPLES = [f"{value:.3f}" for value in 10.0 * shaking(1, 40)]
-MADE = {
+FILES = {
     **WRITTEN,
     "PEER AT2": lambda: at2(SAMPLES, 0.01),
     "GeoNet V2A": lambda: v2a([("N28W", SAMPLES), ("UP", SAMPLES)], 0.02),
@@ -65,7 +65,7 @@ def damaged(content: bytes, data: st.DataObject) -> bytes:
     return bytes(text)
 
 
-@pytest.mark.parametrize("name", MADE)
+@pytest.mark.parametrize("name", FILES)
 @settings(
     max_examples=200,
     suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow],
@@ -73,7 +73,7 @@ def damaged(content: bytes, data: st.DataObject) -> bytes:
 @given(data=st.data())
 def test_damaged(tmp_path: Path, name: str, data: st.DataObject) -> None:
     path = tmp_path / "damaged"
-    content = damaged(MADE[name]().encode(), data)
+    content = damaged(FILES[name]().encode(), data)
     path.write_bytes(content)
     last = content.replace(b"\r\n", b"\n").replace(b"\r", b"\n").count(b"\n") + 1
     try:

@@ -1,4 +1,4 @@
-"""What is written in a network's format comes back to the printed digit, with its names."""
+"""Files in a network's format are read back to the printed digit, with their names."""
 
 from __future__ import annotations
 
@@ -44,10 +44,10 @@ def tables(columns: int) -> st.SearchStrategy[list[list[str]]]:
     return st.lists(st.lists(value, min_size=columns, max_size=columns), min_size=1, max_size=30)
 
 
-def read(folder: Path, text: str, **stated: object) -> list[GroundMotion]:
+def read(folder: Path, text: str, **options: object) -> list[GroundMotion]:
     path = folder / "record"
     path.write_text(text, encoding="latin-1", errors="replace")
-    motions = read_motions(path, **stated)  # type: ignore[arg-type]
+    motions = read_motions(path, **options)  # type: ignore[arg-type]
     assert [motion.trace_index for motion in motions] == list(range(len(motions)))
     assert len({motion.recording for motion in motions}) == 1
     assert motions[0].recording
@@ -351,6 +351,7 @@ WRITTEN: dict[str, Callable[[], str]] = {
     "CDMG V1": lambda: written.cdmg_v1(CHANNELS, 0.01),
     "BHRC V1": lambda: written.bhrc_v1([("L1", ["0.1"] * 12)], 0.01),
     "K-NET/KiK-net ASCII": lambda: written.knet(list(range(12)), 100),
+    "K-NET CSV": lambda: written.knet_csv(TABLE, 100),
     "ESM ASC": lambda: written.esm_asc(["1.0"] * 12, 0.01),
     "CSMNC text": lambda: written.csmnc(["1.0"] * 12, 0.01),
     "CWB dat": lambda: written.cwb(TABLE, 100),

@@ -35,8 +35,8 @@ def test_gain_and_phase(corner_hz: float, order: int, frequency_hz: float) -> No
     t = np.arange(60_000) * DT_S
     envelope = np.exp(-(((t - 300.0) / 60.0) ** 2))
     wave = envelope * np.sin(2.0 * np.pi * frequency_hz * t)
-    made = processed(GroundMotion(wave, DT_S), HighPass(corner_hz=corner_hz, order=order))
-    back = made.acceleration_g[PADDING:-PADDING]
+    result = processed(GroundMotion(wave, DT_S), HighPass(corner_hz=corner_hz, order=order))
+    back = result.acceleration_g[PADDING:-PADDING]
     # the wave is a line of 1/60 Hz width: its gain is that of its middle up to curvature
     amplitude = np.dot(back, wave) / np.dot(wave, wave)
     expected = gain(frequency_hz, corner_hz, order, DT_S)
@@ -57,24 +57,24 @@ def test_offset_and_drift_leave_no_final_velocity() -> None:
     t = good.time_s
     bad = replace(good, acceleration_g=good.acceleration_g + 0.002 + 2e-5 * t)
     assert abs(bad.measures.final_velocity_m_s) > good.pgv_m_s
-    made = processed(bad)
-    assert quality_flags(made) == ()
-    assert abs(made.measures.final_velocity_m_s) < 1e-4 * made.pgv_m_s
-    assert abs(made.measures.final_displacement_m) < 0.01 * made.pgd_m
-    assert made.pga_g == pytest.approx(good.pga_g, rel=0.01)
-    assert made.pgv_m_s == pytest.approx(good.pgv_m_s, rel=0.05)
+    result = processed(bad)
+    assert quality_flags(result) == ()
+    assert abs(result.measures.final_velocity_m_s) < 1e-4 * result.pgv_m_s
+    assert abs(result.measures.final_displacement_m) < 0.01 * result.pgd_m
+    assert result.pga_g == pytest.approx(good.pga_g, rel=0.01)
+    assert result.pgv_m_s == pytest.approx(good.pgv_m_s, rel=0.05)
 
 
 def test_zeros_stay_in_the_record_and_every_parameter_is_kept() -> None:
     motion = GroundMotion(
         ordinary(), DT_S, is_corrected=False, start_time=datetime(2020, 1, 1, 0, 0, 20)
     )
-    made = processed(motion, HighPass(taper_s=1.0))
-    assert made.npts == motion.npts + 2 * PADDING
-    assert made.start_time == datetime(2020, 1, 1)
-    assert made.source_sha256 == motion.sha256 != made.sha256
-    assert made.is_corrected
-    assert made.processing_applied == {
+    result = processed(motion, HighPass(taper_s=1.0))
+    assert result.npts == motion.npts + 2 * PADDING
+    assert result.start_time == datetime(2020, 1, 1)
+    assert result.source_sha256 == motion.sha256 != result.sha256
+    assert result.is_corrected
+    assert result.processing_applied == {
         "mean_removed": True,
         "filter": "butterworth high-pass",
         "passes": "forward and backward",
@@ -89,8 +89,8 @@ def test_zeros_stay_in_the_record_and_every_parameter_is_kept() -> None:
 def test_taper_is_a_cosine_at_both_ends() -> None:
     spikes = np.zeros(400)
     spikes[[20, 200, 379]] = 1.0
-    made = processed(GroundMotion(spikes, DT_S), HighPass(taper_s=0.4, corner_hz=1e-3))
-    first, middle, last = made.acceleration_g[PADDING + np.array([20, 200, 379])]
+    result = processed(GroundMotion(spikes, DT_S), HighPass(taper_s=0.4, corner_hz=1e-3))
+    first, middle, last = result.acceleration_g[PADDING + np.array([20, 200, 379])]
     assert first / middle == pytest.approx(0.5, abs=0.01)
     assert last / middle == pytest.approx(0.5, abs=0.01)
 
@@ -124,7 +124,7 @@ def test_settings_rejected(settings: dict[str, float]) -> None:
 
 
 @pytest.mark.parametrize(
-    ("is_corrected", "stated", "confirmed", "answer"),
+    ("is_corrected", "column", "confirmed", "answer"),
     [
         (None, "", "", False),
         (True, "", "", False),
@@ -142,14 +142,14 @@ def test_settings_rejected(settings: dict[str, float]) -> None:
     ],
 )
 def test_the_leading_words_say_whether_it_is_corrected(
-    is_corrected: bool | None, stated: str, confirmed: str, answer: bool
+    is_corrected: bool | None, column: str, confirmed: str, answer: bool
 ) -> None:
     motion = GroundMotion(np.ones(3), DT_S, is_corrected=is_corrected)
-    assert counts_as_uncorrected(motion, stated, confirmed) is answer
+    assert counts_as_uncorrected(motion, column, confirmed) is answer
 
 
 @pytest.mark.parametrize(
-    ("is_corrected", "stated", "confirmed", "reason"),
+    ("is_corrected", "column", "confirmed", "reason"),
     [
         (None, "uncorected", "", "begin with one of corrected"),
         (None, "drawn anew", "", "begin with one of corrected"),
@@ -162,11 +162,11 @@ def test_the_leading_words_say_whether_it_is_corrected(
     ],
 )
 def test_other_words_and_contradictions_are_rejected(
-    is_corrected: bool | None, stated: str, confirmed: str, reason: str
+    is_corrected: bool | None, column: str, confirmed: str, reason: str
 ) -> None:
     motion = GroundMotion(np.ones(3), DT_S, is_corrected=is_corrected)
     with pytest.raises(InputError, match=reason):
-        counts_as_uncorrected(motion, stated, confirmed)
+        counts_as_uncorrected(motion, column, confirmed)
 
 
 @pytest.mark.parametrize(("first_word", "corrected"), [("Corrected", True), ("Uncorrected", False)])

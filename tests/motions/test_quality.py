@@ -39,7 +39,7 @@ def test_gal_read_as_g_is_noticed() -> None:
 
 
 @pytest.mark.parametrize(
-    ("dt_s", "found"),
+    ("dt_s", "expected"),
     [
         (0.02, set()),
         (0.025, set()),
@@ -48,8 +48,8 @@ def test_gal_read_as_g_is_noticed() -> None:
         (0.5e-4, {"dt_suspicious"}),
     ],
 )
-def test_dt(dt_s: float, found: set[str]) -> None:
-    assert codes(ordinary(), dt_s) & {"coarse_for_tm", "dt_suspicious"} == found
+def test_dt(dt_s: float, expected: set[str]) -> None:
+    assert codes(ordinary(), dt_s) & {"coarse_for_tm", "dt_suspicious"} == expected
 
 
 def test_short_record() -> None:

@@ -11,7 +11,7 @@ from rbfrag.errors import MotionFileError, UnknownFormatError
 from rbfrag.motions.formats import delimited_text
 from rbfrag.motions.metadata import read_metadata
 from rbfrag.motions.readers import HEAD_CHARACTERS, READERS, read_motion, read_motions
-from rbfrag.motions.text.file import read_text
+from rbfrag.motions.text import read_text
 
 COUNTS = {
     "peer_at2_opensees": 52,
@@ -115,9 +115,9 @@ def test_one_reader_recognises_each_file(records_dir: Path) -> None:
     readers: dict[str, set[str]] = {}
     for row in manifest(records_dir):
         head = read_text(records_dir / row["file"])[:HEAD_CHARACTERS]
-        found = [r.FORMAT for r in READERS if r is not delimited_text and r.recognises(head)]
-        assert len(found) == (0 if row["set"] in plain else 1), row["file"]
-        readers.setdefault(row["set"], set()).update(found)
+        recognised = [r.FORMAT for r in READERS if r is not delimited_text and r.recognises(head)]
+        assert len(recognised) == (0 if row["set"] in plain else 1), row["file"]
+        readers.setdefault(row["set"], set()).update(recognised)
     assert all(len(formats) <= 1 for formats in readers.values())
 
 

@@ -1,4 +1,4 @@
-"""What is written comes back to the printed digit; what is damaged is rejected, never misread."""
+"""Files are read back to the printed digit; damaged files are rejected, never misread."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ def test_at2(
     samples=values.filter(lambda samples: len(samples) > 1),
     dt_s=intervals,
     first=st.integers(0, 1000),
-    places=st.integers(4, 8),
+    decimals=st.integers(4, 8),
     mark=st.sampled_from([",", ";", "\t", "  ", ", "]),
     unit=st.sampled_from(["g", "m/s2", "cm/s2", "mm/s2"]),
     stated_by=st.sampled_from(["# Time (s),Acceleration ({})\n", "time [s],acc [{}]\n", ""]),
@@ -66,12 +66,12 @@ def test_two_columns(
     samples: list[float],
     dt_s: float,
     first: int,
-    places: int,
+    decimals: int,
     mark: str,
     unit: str,
     stated_by: str,
 ) -> None:
-    times = [f"{(first + i) * dt_s:.{places}f}" for i in range(len(samples))]
+    times = [f"{(first + i) * dt_s:.{decimals}f}" for i in range(len(samples))]
     printed = [repr(value) for value in samples]
     path = tmp_path / "record"
     path.write_text(two_columns(times, printed, mark=mark, header=stated_by.format(unit)))
@@ -137,14 +137,14 @@ def test_damaged_files(tmp_path: Path, data: st.DataObject) -> None:
     for _ in range(data.draw(st.integers(1, 4), label="edits")):
         at = data.draw(st.integers(0, max(len(content) - 1, 0)), label="at")
         edit = data.draw(st.sampled_from(["change", "insert", "delete", "cut", "repeat"]))
-        some = data.draw(st.binary(min_size=1, max_size=4) | st.sampled_from(
+        damage = data.draw(st.binary(min_size=1, max_size=4) | st.sampled_from(
             [b"nan", b"-", b".", b"E", b"9", b"0", b" ", b"\n", b"\r", b",", b";", b"#", b"inf",
              b"1e999", b"\xff", b"\xe2\x80\xa8", b"\x0c", b"\x1c", b"_"]
         ))  # fmt: skip
         if edit == "change":
-            content[at : at + len(some)] = some
+            content[at : at + len(damage)] = damage
         elif edit == "insert":
-            content[at:at] = some
+            content[at:at] = damage
         elif edit == "delete":
             del content[at : at + data.draw(st.integers(1, 200))]
         elif edit == "cut":

@@ -58,12 +58,12 @@ def direct(
             first = a[i] + share * (a[i + 1] - a[i])
             total = 0.0
             for j in range(i, motion.npts - 1):
-                left, before = (start, first) if j == i else (t[j], a[j])
-                length = t[j + 1] - left
+                start_node, before = (start, first) if j == i else (t[j], a[j])
+                length = t[j + 1] - start_node
                 # pieces short enough for the exponential to be a polynomial to rounding
                 pieces = max(1, math.ceil(0.5 * p * length))
                 for k in range(pieces):
-                    s = left + length * (k + u) / pieces
+                    s = start_node + length * (k + u) / pieces
                     inside = before + (a[j + 1] - before) * (k + u) / pieces
                     fading = np.exp(-p * (s - start))
                     total += length / pieces * float(np.sum(weight * inside * fading))
@@ -79,8 +79,10 @@ def half_sine_form(f: float) -> float:
     low, high = 0.0, 0.5 * math.pi
     for _ in range(200):
         middle = 0.5 * (low + high)
-        left = x * math.sin(middle) - math.cos(middle)
-        low, high = (middle, high) if left < math.exp(-(math.pi - middle) / x) else (low, middle)
+        difference = x * math.sin(middle) - math.cos(middle)
+        low, high = (
+            (middle, high) if difference < math.exp(-(math.pi - middle) / x) else (low, middle)
+        )
     return math.sin(low)
 
 

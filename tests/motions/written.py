@@ -31,11 +31,11 @@ def at2(
     per_line: int = 5,
 ) -> str:
     """Text of an AT2 file; `samples` as printed."""
-    stated = sampling.format(npts=len(samples) if npts is None else npts, dt=dt_s)
-    if dt_s < 1.0 and "  0." not in stated:
-        stated = stated.replace(" 0.", "  .")
+    line = sampling.format(npts=len(samples) if npts is None else npts, dt=dt_s)
+    if dt_s < 1.0 and "  0." not in line:
+        line = line.replace(" 0.", "  .")
     lines = ["PEER STRONG MOTION DATABASE RECORD. PROCESSING BY PACIFIC ENGINEERING.", names]
-    lines += [quantity, stated]
+    lines += [quantity, line]
     lines += ["  ".join(samples[i : i + per_line]) for i in range(0, len(samples), per_line)]
     return "\n".join(lines) + "\n"
 

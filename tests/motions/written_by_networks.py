@@ -52,7 +52,7 @@ def csmip_v2(channels: Channels, dt_s: float, *, old: bool = False) -> str:
             *_numeric_header(8, 10, ".000"),
         ]
         series = []
-        for what, unit, some in (
+        for quantity, unit, samples in (
             ("accel", "cm/sec2.", tokens),
             ("veloc", "cm/sec.", ["1.0"] * npts),
             ("displ", "cm.", ["2.0"] * npts),
@@ -61,9 +61,9 @@ def csmip_v2(channels: Channels, dt_s: float, *, old: bool = False) -> str:
             if old:
                 layout = f"(UNITS: {unit.replace('sec2', 'sec/sec').removesuffix('.')})"
             series.append(
-                f"{npts:7d} points of {what} data equally spaced at {dt_s:6.3f} sec, {layout}"
+                f"{npts:7d} points of {quantity} data equally spaced at {dt_s:6.3f} sec, {layout}"
             )
-            series += rows(some, 8, 10)
+            series += rows(samples, 8, 10)
         if old:
             text, series = [t.upper() for t in text], [t.upper() for t in series]
         lines += [*text, *series, f"/&  ----------  End of data for channel  {number}  ----------"]
@@ -243,6 +243,32 @@ def knet(
     return _file(header + [f"{row} " for row in rows([str(c) for c in counts], 8, 9)])
 
 
+def knet_csv(table: Sequence[Sequence[str]], frequency_hz: int) -> str:
+    """Text of rows of north-south, east-west and vertical acceleration [gal]."""
+    rows_of_values = [
+        f"2024/01/01 00:00:15.{at:02d},{at / frequency_hz:.2f},{','.join(row)}"
+        for at, row in enumerate(table)
+    ]
+    return _file(
+        [
+            "#K-NET CSV",
+            "#Event",
+            "#OriginTime,Latitude,Longitude,Depth(km),Magnitude",
+            "#2024/01/01 00:00:00,35.000,135.000,10,6.0",
+            "#Station",
+            "#Code,Latitude,Longitude,Height(m)",
+            "#XXX001,35.0000,135.0000,10",
+            "#Record",
+            "#SamplingFrequency(Hz)",
+            f"#{frequency_hz}",
+            "#DurationTime(s)",
+            f"#{len(table) / frequency_hz:g}",
+            "#Time,RelativeTime(s),N-S(gal),E-W(gal),U-D(gal)",
+            *rows_of_values,
+        ]
+    )
+
+
 def _largest_gal(counts: Sequence[int], scale: str) -> str:
     """The largest acceleration after the mean was taken off."""
     numbers = [float(part) for part in re.findall(r"[\d.]+", scale)]
@@ -363,7 +389,7 @@ def unam(table: Sequence[Sequence[str]], dt_s: float, *, names: Sequence[str]) -
     rule = "---------+" * 8
     npts, count = len(table), len(names)
 
-    def each(value: object) -> str:
+    def cell(value: object) -> str:
         return "".join(f"/{value}" for _ in names)
 
     return _file(
@@ -381,12 +407,12 @@ def unam(table: Sequence[Sequence[str]], dt_s: float, *, names: Sequence[str]) -
             f"NUMERO DE CANALES                      : {count}",
             f"ORIENTACION C1-C6 (rumbo;orientacion)  : {''.join(f'/{name}' for name in names)}",
             "ORIENTACION C7-C12 (rumbo;orientacion) : ",
-            f"INTERVALO DE MUESTREO, C1-C6 (s)       : {each(f'{dt_s:g}')}",
+            f"INTERVALO DE MUESTREO, C1-C6 (s)       : {cell(f'{dt_s:g}')}",
             "INTERVALO DE MUESTREO, C7-C12 (s)      : ",
             "FECHA DEL SISMO [GMT]                  : 2017/09/19",
             "HORA EPICENTRO (GMT)                   : 18:14:40",
-            f"DURACION DEL REGISTRO (s), C1-C6       : {each(f'{npts * dt_s:.3f}')}",
-            f"NUM. TOTAL DE MUESTRAS, C1-C6          : {each(npts)}",
+            f"DURACION DEL REGISTRO (s), C1-C6       : {cell(f'{npts * dt_s:.3f}')}",
+            f"NUM. TOTAL DE MUESTRAS, C1-C6          : {cell(npts)}",
             "ACEL. MAX.(Gal), C1-C6                 : "
             + "".join(f"/{peak(column, decimals=4)}" for column in zip(*table, strict=True)),
             "UNIDADES DE LOS DATOS                  : Gal (cm/s/s)",

@@ -40,12 +40,12 @@ class ConfinedTopple:
         )  # fmt: skip
 
     def ends_as(self, springs: Simulated) -> bool:
-        """Whether both fall, or both do not."""
+        """Return whether both fall, or both do not."""
         falls = float(-springs.turned_rad.min()) > FALLEN_RAD
         return self.answer.outcome is (Outcome.TOPPLED if falls else Outcome.STABLE)
 
     def is_covered(self, springs: Simulated, part: float = 1.0) -> bool:
-        """Whether the peaks of a block that stays differ by a part of the error estimate."""
+        """Return whether the peaks of a block that stays differ by a part of the error estimate."""
         peak, error = self.answer.peak_theta_rad, self.answer.error_estimate
         assert peak is not None
         assert error is not None

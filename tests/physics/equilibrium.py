@@ -153,7 +153,7 @@ def limit_of_equilibrium(case: Case, back_plane: bool = True) -> Limit | None:
     right = [*((1.0 + case.kv) * upward(case)), 0.0]
     cost = np.zeros(len(columns))
     cost[-1] = -1.0
-    found = linprog(
+    result = linprog(
         cost,
         A_eq=np.array(columns).T,
         b_eq=np.array(right),
@@ -161,10 +161,10 @@ def limit_of_equilibrium(case: Case, back_plane: bool = True) -> Limit | None:
         method="highs",
         options={"primal_feasibility_tolerance": 1e-10, "dual_feasibility_tolerance": 1e-10},
     )
-    if found.status != 0:
-        assert found.status in (2, 3, 4), found.message
+    if result.status != 0:
+        assert result.status in (2, 3, 4), result.message
         return None
-    forces = found.x
+    forces = result.x
     low, high = (forces[4] + forces[5], forces[6] + forces[7]) if back_plane else (0.0, 0.0)
     return Limit(
         k=float(forces[-1]),

@@ -32,7 +32,7 @@ SCAN_POINTS = 400
 
 
 class LinearRun(NamedTuple):
-    """What one block did: whether it toppled, and its peak rotation over the critical angle."""
+    """Response of one block: whether it toppled, and its peak rotation over the critical angle."""
 
     toppled: bool
     peak_theta_n: float
@@ -88,9 +88,9 @@ def _excursion(
     theta, rate, peak = 0.0, 0.0, 0.0
     lifting = k_h[i] - w[i] * kr <= 0.0 and tau > 0.0  # at a crossing: the first step has no impact
     while i < interval_s.size:
-        left = p * interval_s[i] * (1.0 - tau)
-        pieces = max(1, math.ceil(left / PH_MAX))
-        part, ph = (1.0 - tau) / pieces, left / pieces
+        remaining = p * interval_s[i] * (1.0 - tau)
+        pieces = max(1, math.ceil(remaining / PH_MAX))
+        part, ph = (1.0 - tau) / pieces, remaining / pieces
         if ph > 0.0:
             dk, dw = k_h[i + 1] - k_h[i], w[i + 1] - w[i]
             for piece in range(pieces):
@@ -114,11 +114,11 @@ def _excursion(
         if rate > 0.0 and kr - theta < min(tail_min_q[i], 0.0):
             return TOPPLED, i, tau, peak
     # x'' = p² x: the states with rate = x come to rest upright
-    left = kr - theta
-    if rate > left:
+    remaining = kr - theta
+    if rate > remaining:
         return TOPPLED, i, tau, peak
     if rate > 0.0:
-        peak = max(peak, kr - math.sqrt(left * left - rate * rate))
+        peak = max(peak, kr - math.sqrt(remaining * remaining - rate * rate))
     return IN_AIR, i, tau, peak
 
 
@@ -161,7 +161,7 @@ def _any_excursion_fails(
     p: float,
     kr: float,
 ) -> bool:
-    """Whether an excursion from rest at any rise of the excitation above kr topples."""
+    """Return whether an excursion from rest at any rise of the excitation above kr topples."""
     above = False
     for i in range(interval_s.size):
         if not above and interval_s[i] > 0.0:
@@ -182,7 +182,7 @@ def respond(motion: GroundMotion, *, p2: float, kr: float) -> LinearRun:
 
 
 def fails(excited: Excitation, p2: float, kr: float) -> bool:
-    """Whether a block that starts from rest at any rise of the excitation above k_r topples."""
+    """Return whether a block at rest at any rise of the excitation above k_r topples."""
     return bool(_any_excursion_fails(*_arrays(excited), math.sqrt(p2), kr))
 
 

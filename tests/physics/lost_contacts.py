@@ -44,7 +44,7 @@ class LostContact:
 
     @property
     def sort(self) -> str:
-        """Which of `SORTS` it is."""
+        """Return which of `SORTS` it is."""
         if any("whole base" in text for text in self.answer.warnings):
             return SORTS[0]
         if any(change.motion == CLIMBS for change in self.answer.mode_changes):
@@ -78,7 +78,7 @@ class LostContact:
         return self.greatest - float(theirs.max()), last - float(theirs[-1])
 
     def is_covered(self, springs: Simulated, error: float) -> bool:
-        """Whether both differences are within an error and the give of the springs."""
+        """Return whether both differences are within an error and the give of the springs."""
         size = self.block.r3_m if self.answer.kind == "slumping" else 1.0
         return max(map(abs, self.differences(springs))) <= error + ELASTIC_M / size
 
@@ -149,12 +149,12 @@ def tipping_slides(seed: int, motions: Iterator[GroundMotion]) -> Iterator[LostC
 
 def of_each_sort(seed: int, counts: dict[str, int]) -> list[LostContact]:
     """Draw until there are as many as asked for of each sort."""
-    left = dict(counts)
+    remaining = dict(counts)
     drawn = []
-    for each in lost_contacts(seed):
-        if left.get(each.sort, 0):
-            left[each.sort] -= 1
-            drawn.append(each)
-        if not any(left.values()):
+    for item in lost_contacts(seed):
+        if remaining.get(item.sort, 0):
+            remaining[item.sort] -= 1
+            drawn.append(item)
+        if not any(remaining.values()):
             break
     return drawn

@@ -34,7 +34,7 @@ GRAVITY = 9.80665
 
 @dataclass(frozen=True)
 class Simulated:
-    """What the free block did after it had settled under gravity.
+    """Motion of the free block after it had settled under gravity.
 
     Args:
         time_s: times [s].
@@ -85,7 +85,7 @@ def simulate(
     horizontal = np.asarray(k_h, dtype=np.float64)
     vertical = np.zeros_like(horizontal) if k_v is None else np.asarray(k_v, dtype=np.float64)
     corners = np.array([block.heel, block.toe, block.back])
-    kept = _shake(
+    retained = _shake(
         corners,
         block.inertia_m2,
         np.array(block.centroid),
@@ -102,7 +102,7 @@ def simulate(
         keep,
         damping,
     )
-    return Simulated(kept[0], kept[1], kept[2], kept[3])
+    return Simulated(retained[0], retained[1], retained[2], retained[3])
 
 
 @njit(cache=True, error_model="numpy")
@@ -125,7 +125,7 @@ def _shake(
 ) -> FloatArray:
     settle = int(SETTLE_S / dt)
     steps = int(until_s / dt)
-    kept = np.empty((4, steps // keep + 1))
+    retained = np.empty((4, steps // keep + 1))
     # which corner against which plane: heel and toe on the base, heel and back on the back plane
     corner = np.array([0, 1, 0, 2])
     normal_x = np.array([0.0, 0.0, math.sin(gamma), math.sin(gamma)])
@@ -194,13 +194,13 @@ def _shake(
             toe0 = x + corners[1, 0] * math.cos(turned) - corners[1, 1] * math.sin(turned)
         if n >= 0 and n % keep == 0:
             m = n // keep
-            kept[0, m] = t
-            kept[1, m] = turned - turned0
+            retained[0, m] = t
+            retained[1, m] = turned - turned0
             heel = x + corners[0, 0] * math.cos(turned) - corners[0, 1] * math.sin(turned)
             toe = x + corners[1, 0] * math.cos(turned) - corners[1, 1] * math.sin(turned)
-            kept[2, m] = heel - heel0
-            kept[3, m] = toe - toe0
-    return kept
+            retained[2, m] = heel - heel0
+            retained[3, m] = toe - toe0
+    return retained
 
 
 RAMP_G_PER_S = 0.5

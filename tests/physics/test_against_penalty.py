@@ -60,7 +60,7 @@ def both(case: Case, horizontal: NDArray[np.float64], dt_s: float) -> tuple[Resp
         vertical=None if vertical is None else GroundMotion(vertical, dt_s),
         history=True,
     )
-    free = simulate(
+    free_standing = simulate(
         case.block,
         beta_deg=case.beta,
         phi_deg=case.phi,
@@ -70,7 +70,7 @@ def both(case: Case, horizontal: NDArray[np.float64], dt_s: float) -> tuple[Resp
         k_v=vertical,
         until_s=case.until,
     )
-    return answer, free
+    return answer, free_standing
 
 
 SLUMPS = {
@@ -92,27 +92,27 @@ SLUMPS = {
 @pytest.mark.parametrize("name", SLUMPS)
 def test_slump(name: str) -> None:
     case = SLUMPS[name]
-    answer, free = both(case, half_sines(case.lobes), DT_S)
+    answer, free_standing = both(case, half_sines(case.lobes), DT_S)
     assert answer.kind == "slumping"
     assert answer.outcome is Outcome.STABLE
     assert answer.peak_theta_rad is not None
-    assert free.turned_rad.max() == pytest.approx(answer.peak_theta_rad, rel=1e-3)
+    assert free_standing.turned_rad.max() == pytest.approx(answer.peak_theta_rad, rel=1e-3)
     if name == "reversed":
         # up to its seat, where the springs rebound
         return
-    assert free.turned_rad[-1] == pytest.approx(answer.final_theta_rad, rel=1e-3)
-    assert free.heel_m[-1] == pytest.approx(answer.displacement_m, rel=1e-3)
-    assert deviation(answer, free, case.until) < 3e-3 * answer.peak_theta_rad
+    assert free_standing.turned_rad[-1] == pytest.approx(answer.final_theta_rad, rel=1e-3)
+    assert free_standing.heel_m[-1] == pytest.approx(answer.displacement_m, rel=1e-3)
+    assert deviation(answer, free_standing, case.until) < 3e-3 * answer.peak_theta_rad
 
 
 def test_a_slump_that_is_driven_back_to_its_seat() -> None:
     # strong uphill shaking undoes a slump; a model that only moves down the slope misses it
     case = Case(45, 65, 1, 0, 35, 35, ((0.1, 0.3, 0.9), (0.45, 0.3, -2.0)))
-    answer, free = both(case, half_sines(case.lobes), DT_S)
+    answer, free_standing = both(case, half_sines(case.lobes), DT_S)
     assert answer.peak_theta_rad is not None
     assert answer.final_theta_rad == 0.0
     assert answer.displacement_m == 0.0
-    assert abs(free.turned_rad[-1]) < 0.02 * answer.peak_theta_rad
+    assert abs(free_standing.turned_rad[-1]) < 0.02 * answer.peak_theta_rad
     assert any("driven back" in warning for warning in answer.warnings)
 
 
@@ -127,19 +127,19 @@ CONFINED = {
 @pytest.mark.parametrize("name", CONFINED)
 def test_confined(name: str) -> None:
     case = CONFINED[name]
-    answer, free = both(case, half_sines(case.lobes), DT_S)
+    answer, free_standing = both(case, half_sines(case.lobes), DT_S)
     assert answer.kind == "confined_toppling"
     assert answer.outcome is Outcome.STABLE
     assert answer.peak_theta_rad is not None
-    assert -free.turned_rad.min() == pytest.approx(answer.peak_theta_rad, rel=1e-3)
-    assert free.toe_m.max() == pytest.approx(answer.peak_displacement_m, rel=1e-3)
+    assert -free_standing.turned_rad.min() == pytest.approx(answer.peak_theta_rad, rel=1e-3)
+    assert free_standing.toe_m.max() == pytest.approx(answer.peak_displacement_m, rel=1e-3)
     # it rocks back about the toe; what it does from its fall on the base is in test_followed_on.py
     change = answer.mode_changes[0]
     assert change.motion.startswith("rocks back")
     assert answer.history is not None
     back_s = landing(answer.history.time_s, answer.history.turned_rad, change.time_s)
-    assert deviation(answer, free, back_s, sign=-1.0) < 5e-3 * answer.peak_theta_rad
-    landed = landing(free.time_s, free.turned_rad, change.time_s)
+    assert deviation(answer, free_standing, back_s, sign=-1.0) < 5e-3 * answer.peak_theta_rad
+    landed = landing(free_standing.time_s, free_standing.turned_rad, change.time_s)
     assert landed == pytest.approx(back_s, abs=2e-3)
 
 
@@ -181,24 +181,26 @@ def test_motion_that_goes_on_after_the_record() -> None:
 
 def test_confined_to_free_toppling() -> None:
     case = Case(-30, 20, 1, 0, 35, 35, ((0.1, 0.5, 1.0),), until=1.0)
-    answer, free = both(case, half_sines(case.lobes), DT_S)
+    answer, free_standing = both(case, half_sines(case.lobes), DT_S)
     (change,) = answer.mode_changes
     assert change.motion.startswith("topples freely")
     assert answer.outcome is Outcome.TOPPLED
     assert answer.history is not None
-    handed_over = np.interp(change.time_s, free.time_s, -free.turned_rad)
+    handed_over = np.interp(change.time_s, free_standing.time_s, -free_standing.turned_rad)
     assert handed_over == pytest.approx(np.radians(case.block.gamma_deg - 90.0), rel=1e-3)
-    assert deviation(answer, free, change.time_s + 0.1, sign=-1.0) < 1e-3 * np.radians(
+    assert deviation(answer, free_standing, change.time_s + 0.1, sign=-1.0) < 1e-3 * np.radians(
         case.block.gamma_deg - 90.0
     )
 
 
-def deviation(answer: Response, free: Simulated, until_s: float, sign: float = 1.0) -> float:
+def deviation(
+    answer: Response, free_standing: Simulated, until_s: float, sign: float = 1.0
+) -> float:
     """Greatest difference of the rotations up to a time."""
     assert answer.history is not None
-    ours = np.interp(free.time_s, answer.history.time_s, answer.history.theta_rad)
-    here = free.time_s <= until_s
-    return float(np.abs(sign * free.turned_rad - ours)[here].max())
+    ours = np.interp(free_standing.time_s, answer.history.time_s, answer.history.theta_rad)
+    local = free_standing.time_s <= until_s
+    return float(np.abs(sign * free_standing.turned_rad - ours)[local].max())
 
 
 REAL_SLUMPS = {
@@ -213,19 +215,19 @@ def record_case(records_dir: Path, record: str, case: Case) -> tuple[Response, S
     """Both answers, and the time up to which the model says anything."""
     motion = read_motions(records_dir / record)[0]
     assert motion.dt_s is not None
-    answer, free = both(case, motion.acceleration_g, motion.dt_s)
+    answer, free_standing = both(case, motion.acceleration_g, motion.dt_s)
     until_s = case.until
     if answer.mode_changes:
         until_s = answer.mode_changes[0].time_s
     elif answer.outcome is not Outcome.STABLE:
         assert answer.stopped_s is not None
         until_s = answer.stopped_s
-    return answer, free, until_s
+    return answer, free_standing, until_s
 
 
 @pytest.mark.parametrize("record", REAL_SLUMPS)
 def test_slump_under_a_record(record: str, records_dir: Path) -> None:
-    answer, free, until_s = record_case(records_dir, record, REAL_SLUMPS[record])
+    answer, free_standing, until_s = record_case(records_dir, record, REAL_SLUMPS[record])
     assert answer.kind == "slumping"
     assert answer.history is not None
     # up to where it leaves the plane, or to the end; what follows is in benchmarks.followed_on
@@ -233,16 +235,18 @@ def test_slump_under_a_record(record: str, records_dir: Path) -> None:
     assert peak > 0.01
     if not answer.mode_changes:
         assert peak == answer.peak_theta_rad
-    assert free.turned_rad[free.time_s <= until_s].max() == pytest.approx(peak, rel=1e-3)
-    assert deviation(answer, free, until_s) < 1e-3 * peak
+    assert free_standing.turned_rad[free_standing.time_s <= until_s].max() == pytest.approx(
+        peak, rel=1e-3
+    )
+    assert deviation(answer, free_standing, until_s) < 1e-3 * peak
 
 
 @pytest.mark.parametrize("record", ["CHY028-N.AT2", "CHY080-N.AT2"])
 def test_confined_under_a_record(record: str, records_dir: Path) -> None:
     case = Case(-60, 20, 1, 15, 35, 35, (), until=38.0)
-    answer, free, until_s = record_case(records_dir, f"peer_at2_opensees/{record}", case)
+    answer, free_standing, until_s = record_case(records_dir, f"peer_at2_opensees/{record}", case)
     assert answer.kind == "confined_toppling"
     assert answer.history is not None
     peak = float(answer.history.theta_rad[answer.history.time_s <= until_s].max())
     assert peak > 0.02
-    assert deviation(answer, free, until_s, sign=-1.0) < 1e-3 * peak
+    assert deviation(answer, free_standing, until_s, sign=-1.0) < 1e-3 * peak

@@ -1,4 +1,4 @@
-"""What chapter 3 of the dissertation says of yields, on blocks drawn over its chart."""
+"""Yields of chapter 3 of the dissertation, on blocks drawn over its chart."""
 
 from __future__ import annotations
 
@@ -42,10 +42,10 @@ def test_sliding_is_the_greatest_of_three_yields_and_confined_topples_exceed_it(
         phi, beta = random.uniform((20.0, -10.0), (60.0, 60.0)).tolist()
         if a3 - a1 < 1.0:
             continue
-        found = at(a1, a3, phi, beta)
+        result = at(a1, a3, phi, beta)
         sliding = math.tan(math.radians(phi - beta))
-        above[found.mode] += found.yield_acceleration > sliding + 1e-9 * (1.0 + abs(sliding))
-        held[found.mode] += beta > phi and found.state != "unstable"
+        above[result.mode] += result.yield_acceleration > sliding + 1e-9 * (1.0 + abs(sliding))
+        held[result.mode] += beta > phi and result.state != "unstable"
     assert above.pop("confined_topple") == 1393
     assert set(above.values()) == {0}
     # where the base is steeper than friction, only a confined topple can stand

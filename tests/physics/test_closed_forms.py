@@ -32,9 +32,9 @@ P = math.sqrt(P2)
 
 def critical_ratio(motion: GroundMotion) -> float:
     """Critical angle over the amplitude."""
-    found = linear_block.critical_angle(motion, p2=P2)
-    assert found is not None
-    return found / excitation(motion).pga_g
+    result = linear_block.critical_angle(motion, p2=P2)
+    assert result is not None
+    return result / excitation(motion).pga_g
 
 
 def half_sine(f: float) -> float:
@@ -83,14 +83,14 @@ def test_pulse_of_straight_lines(name: str, f: float) -> None:
 
 @pytest.mark.parametrize("f", F)
 def test_half_sine_sampled(f: float) -> None:
-    found = critical_ratio(sine_lobes(f / P, (AMPLITUDE_G,), 2000))
-    assert found == pytest.approx(half_sine(f), rel=1e-6)
+    result = critical_ratio(sine_lobes(f / P, (AMPLITUDE_G,), 2000))
+    assert result == pytest.approx(half_sine(f), rel=1e-6)
 
 
 @pytest.mark.parametrize("f", F)
 def test_one_cycle_sine_sampled(f: float) -> None:
-    found = critical_ratio(sine_lobes(f / P, (AMPLITUDE_G, -AMPLITUDE_G), 3000))
-    assert found == pytest.approx(full_sine(f), rel=1e-6)
+    result = critical_ratio(sine_lobes(f / P, (AMPLITUDE_G, -AMPLITUDE_G), 3000))
+    assert result == pytest.approx(full_sine(f), rel=1e-6)
 
 
 @pytest.mark.parametrize(
@@ -105,15 +105,15 @@ def test_one_cycle_sine_sampled(f: float) -> None:
 )
 def test_published_table(f: float, sine: float, triangular: float) -> None:
     assert half_sine(f) == pytest.approx(sine, abs=6e-9)
-    found = critical_ratio(triangle(f / P, AMPLITUDE_G))
-    assert found == pytest.approx(triangular, abs=6e-9)
+    result = critical_ratio(triangle(f / P, AMPLITUDE_G))
+    assert result == pytest.approx(triangular, abs=6e-9)
 
 
 def test_error_of_a_sampled_pulse_falls_with_the_square_of_the_interval() -> None:
     errors = []
     for samples in (50, 100, 200, 400):
-        found = critical_ratio(sine_lobes(1.0 / P, (AMPLITUDE_G,), samples))
-        errors.append(abs(found / half_sine(1.0) - 1.0))
+        result = critical_ratio(sine_lobes(1.0 / P, (AMPLITUDE_G,), samples))
+        errors.append(abs(result / half_sine(1.0) - 1.0))
     orders = [math.log2(a / b) for a, b in pairwise(errors)]
     assert orders == pytest.approx([2.0] * 3, abs=0.1)
 
@@ -136,18 +136,18 @@ def test_peak_of_the_rectangular_cycle_at_its_critical_value(f: float) -> None:
 
 @pytest.mark.parametrize("amplitude_g", [1e-4, 0.05, 3.0])
 def test_linear_critical_ratio_does_not_depend_on_the_amplitude(amplitude_g: float) -> None:
-    found = critical_ratio(triangle(1.3 / P, amplitude_g))
+    result = critical_ratio(triangle(1.3 / P, amplitude_g))
     expected = critical_ratio(triangle(1.3 / P, 1.0))
-    assert found == pytest.approx(expected, rel=1e-11)
+    assert result == pytest.approx(expected, rel=1e-11)
 
 
 def test_responses_scale_with_the_amplitude() -> None:
     motion = GroundMotion(shaking(2), 0.02)
     kr = 0.8 * float(motion.acceleration_g.max())
-    one = linear_block.respond(motion, p2=5.0, kr=kr)
+    single = linear_block.respond(motion, p2=5.0, kr=kr)
     other = linear_block.respond(motion.scaled(0.01), p2=5.0, kr=0.01 * kr)
-    assert 0.0 < one.peak_theta_n < 1.0
-    assert other.peak_theta_n == pytest.approx(one.peak_theta_n, rel=1e-10)
+    assert 0.0 < single.peak_theta_n < 1.0
+    assert other.peak_theta_n == pytest.approx(single.peak_theta_n, rel=1e-10)
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -157,10 +157,10 @@ def test_runs_agree_with_the_reference_integrator(seed: int) -> None:
     toppled = 0
     for share in (0.15, 0.3, 0.6, 0.9):
         kr = share * excited.max_q
-        found = linear_block.respond(motion, p2=20.0, kr=kr)
+        result = linear_block.respond(motion, p2=20.0, kr=kr)
         truth = reference.integrate(excited.time_s, excited.k_h, None, p2=20.0, kr=kr, linear=True)
-        assert found.toppled == (truth.outcome == "toppled")
-        toppled += found.toppled
+        assert result.toppled == (truth.outcome == "toppled")
+        toppled += result.toppled
         if truth.peak_rad is not None:
-            assert found.peak_theta_n == pytest.approx(truth.peak_rad / kr, rel=1e-7, abs=1e-10)
+            assert result.peak_theta_n == pytest.approx(truth.peak_rad / kr, rel=1e-7, abs=1e-10)
     assert toppled < 4

@@ -12,19 +12,19 @@ COUNT = 20
 
 def test_a_confined_block_goes_on_to_rest_or_fall() -> None:
     falls = covered = by_a_hundredth = stays = 0
-    for each in islice(confined_topples(5), COUNT):
-        answer = each.answer
+    for item in islice(confined_topples(5), COUNT):
+        answer = item.answer
         assert answer.outcome in (Outcome.STABLE, Outcome.TOPPLED)
         if answer.error_estimate is None:  # whether it falls is open
             continue
-        springs = each.on_springs()
-        assert each.ends_as(springs)
+        springs = item.on_springs()
+        assert item.ends_as(springs)
         if answer.outcome is Outcome.TOPPLED:
             falls += 1
             continue
         stays += 1
-        covered += each.is_covered(springs)
-        by_a_hundredth += each.is_covered(springs, 0.01)
+        covered += item.is_covered(springs)
+        by_a_hundredth += item.is_covered(springs, 0.01)
     assert falls >= 3
     assert falls + stays >= COUNT - 2
     # the estimate is the spread of some laws of impact, no bound: of many blocks it covers 93 %

@@ -33,15 +33,15 @@ def test_reference_values(
     a1: float, a3: float, phi: float, beta: float, gamma: float, at_rest: float, turned: float
 ) -> None:
     block = Block.from_angles(a1, a3, 1.0)
-    found = stability(block, beta_deg=beta, phi_deg=phi)
+    result = stability(block, beta_deg=beta, phi_deg=phi)
     assert block.gamma_deg == pytest.approx(gamma, abs=1e-6)
-    assert found.yield_acceleration == pytest.approx(at_rest, abs=6e-7)
+    assert result.yield_acceleration == pytest.approx(at_rest, abs=6e-7)
     theta = math.degrees(0.1)
     if a1 > phi:
-        assert (found.mode, found.ks) == ("slump", found.yield_acceleration)
+        assert (result.mode, result.ks) == ("slump", result.yield_acceleration)
         after = ks_after_rotation(block, theta, beta_deg=beta, phi_deg=phi)
     else:
-        assert (found.mode, found.kct) == ("confined_topple", found.yield_acceleration)
+        assert (result.mode, result.kct) == ("confined_topple", result.yield_acceleration)
         after = kct_after_rotation(block, theta, beta_deg=beta, phi_deg=phi)
     assert after == pytest.approx(turned, abs=6e-7)
 
@@ -66,18 +66,18 @@ def test_table_3_1_toppling(height: float, alpha3: float, at_20: float, at_25: f
     block = rectangle(2.57, height)
     assert block.alpha3_deg == pytest.approx(alpha3, abs=0.005)
     for beta, expected in ((20.0, at_20), (25.0, at_25)):
-        found = stability(block, beta_deg=beta, phi_deg=45.0)
-        assert found.mode == "topple"
-        assert found.kr == pytest.approx(expected, abs=5e-4)
-        assert found.state == ("stable" if expected > 0.0 else "unstable")
+        result = stability(block, beta_deg=beta, phi_deg=45.0)
+        assert result.mode == "topple"
+        assert result.kr == pytest.approx(expected, abs=5e-4)
+        assert result.state == ("stable" if expected > 0.0 else "unstable")
 
 
 def test_test_11_friction_from_the_yield() -> None:
     # k_y = 0.48 on a base of 20 degrees belongs to φ = 45.6 degrees
     block = Block.from_angles(0.0, 80.0, 1.0)
-    found = stability(block, beta_deg=20.0, phi_deg=45.64)
-    assert found.mode == "slide"
-    assert found.ky == pytest.approx(0.48, abs=2e-4)
+    result = stability(block, beta_deg=20.0, phi_deg=45.64)
+    assert result.mode == "slide"
+    assert result.ky == pytest.approx(0.48, abs=2e-4)
 
 
 SLUMPS = [(2.88, 10.68, 7.752, 25.39, 56.75), (2.90, 7.20, 5.291, 12.67, 60.61)]
@@ -130,10 +130,10 @@ def test_toe_cut_changes_no_mode(breadth: float, height: float) -> None:
 
 def test_table_3_4_mean_block_slides() -> None:
     block = Block.from_fractures(1.0, 0.6, 25.0)
-    found = stability(block, beta_deg=20.0, phi_deg=40.0)
+    result = stability(block, beta_deg=20.0, phi_deg=40.0)
     assert block.alpha1_deg == pytest.approx(35.93, abs=0.005)
     assert block.alpha3_deg == pytest.approx(74.33, abs=0.005)
-    assert found.mode == "slide"
+    assert result.mode == "slide"
 
 
 def test_example_3_shares_and_crossing() -> None:
@@ -144,13 +144,13 @@ def test_example_3_shares_and_crossing() -> None:
     dip1, dip2 = random.normal(20.0, 5.0, n), random.normal(45.0, 5.0, n)
     s1, s2 = random.normal(1.0, 0.1, n), random.normal(0.6, 0.1, n)
     blocks = BlockArray.from_fractures(s1, s2, dip2 - dip1)
-    found = stability_arrays(blocks, beta_deg=dip1, phi_deg=40.0)
-    slides, slumps = found.mode == "slide", found.mode == "slump"
+    result = stability_arrays(blocks, beta_deg=dip1, phi_deg=40.0)
+    slides, slumps = result.mode == "slide", result.mode == "slump"
     error = math.sqrt(0.615 * 0.385 / n)
     assert slides.mean() == pytest.approx(0.615, abs=4.0 * error)
     assert slumps.mean() == pytest.approx(0.385, abs=4.0 * error)
-    assert (found.mode == "topple").sum() == 0
-    ky, ks = found.yield_acceleration[slides], found.yield_acceleration[slumps]
+    assert (result.mode == "topple").sum() == 0
+    ky, ks = result.yield_acceleration[slides], result.yield_acceleration[slumps]
     assert np.median(ky) == pytest.approx(0.398, abs=0.006)
     assert np.median(ks) == pytest.approx(0.289, abs=0.006)
     grid = np.linspace(0.2, 0.6, 401)

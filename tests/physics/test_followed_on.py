@@ -48,12 +48,12 @@ def both(case: Case) -> tuple[Response, Simulated]:
         block=case.block, beta_deg=case.beta, phi_deg=case.phi, phi_back_deg=case.back,
         vertical=None if vertical is None else GroundMotion(vertical, DT_S), history=True,
     )  # fmt: skip
-    free = simulate(
+    free_standing = simulate(
         case.block, beta_deg=case.beta, phi_deg=case.phi, phi_back_deg=case.back,
         time_s=np.arange(horizontal.size) * DT_S, k_h=horizontal, k_v=vertical, until_s=2.4,
         damping=0.7,
     )  # fmt: skip
-    return answer, free
+    return answer, free_standing
 
 
 def first_time(time_s: NDArray[np.float64], holds: NDArray[np.bool_]) -> float:
@@ -64,12 +64,12 @@ def first_time(time_s: NDArray[np.float64], holds: NDArray[np.bool_]) -> float:
 @pytest.mark.parametrize("name", SLIDES)
 def test_a_slide_that_tips_back_and_slumps(name: str) -> None:
     case = SLIDES[name]
-    answer, free = both(case)
+    answer, free_standing = both(case)
     assert answer.kind == "sliding"
     assert answer.outcome is Outcome.STABLE
     assert not any("not followed" in text for text in answer.warnings)
-    assert free.heel_m[-1] == pytest.approx(answer.displacement_m, rel=0.05)
-    assert free.turned_rad[-1] == pytest.approx(answer.final_theta_rad, rel=0.05)
+    assert free_standing.heel_m[-1] == pytest.approx(answer.displacement_m, rel=0.05)
+    assert free_standing.turned_rad[-1] == pytest.approx(answer.final_theta_rad, rel=0.05)
     # at rest on heel and upper back corner: heel and rotation are bound to each other
     gamma = math.radians(case.block.gamma_deg)
     edge_m = case.block.s1_m / math.sin(gamma)
@@ -83,7 +83,7 @@ def test_a_slide_that_tips_back_and_slumps(name: str) -> None:
     for part in (0.02, 0.98):
         least = part * first_rest_rad(answer)
         ours = first_time(history.time_s, history.theta_rad > least)
-        theirs = first_time(free.time_s, free.turned_rad > least)
+        theirs = first_time(free_standing.time_s, free_standing.turned_rad > least)
         assert ours == pytest.approx(theirs, abs=0.01)
 
 
@@ -97,12 +97,12 @@ def first_rest_rad(answer: Response) -> float:
 
 @pytest.mark.parametrize("name", LOST)
 def test_a_slump_that_loses_a_contact(name: str) -> None:
-    answer, free = both(LOST[name])
+    answer, free_standing = both(LOST[name])
     assert answer.kind == "slumping"
     assert answer.outcome is Outcome.STABLE
     assert answer.mode_changes
-    assert free.heel_m[-1] == pytest.approx(answer.displacement_m, rel=0.01)
-    assert free.turned_rad[-1] == pytest.approx(answer.final_theta_rad, rel=0.01)
+    assert free_standing.heel_m[-1] == pytest.approx(answer.displacement_m, rel=0.01)
+    assert free_standing.turned_rad[-1] == pytest.approx(answer.final_theta_rad, rel=0.01)
 
 
 def test_steps_find_the_motion_that_mechanisms_solve_for() -> None:
@@ -116,17 +116,17 @@ def test_steps_find_the_motion_that_mechanisms_solve_for() -> None:
             phi_back_deg=case.back,
         )  # fmt: skip
         excited = excitation(motion, vertical)
-        free = free_motion(
+        free_standing = free_motion(
             site_of(case), excited, Release(0.0, Pose(0.0, case.block.centroid, 0.0))
         )
-        assert free.outcome is Outcome.STABLE
-        assert free.backward_rad == pytest.approx(exact.peak_theta_rad, rel=1e-4)
-        assert free.pose.turned_rad == pytest.approx(exact.final_theta_rad, rel=1e-4)
-        assert free.slip_m == pytest.approx(exact.peak_displacement_m, rel=1e-4)
-        assert free.time_s == pytest.approx(exact.stopped_s, abs=5e-4)
+        assert free_standing.outcome is Outcome.STABLE
+        assert free_standing.backward_rad == pytest.approx(exact.peak_theta_rad, rel=1e-4)
+        assert free_standing.pose.turned_rad == pytest.approx(exact.final_theta_rad, rel=1e-4)
+        assert free_standing.slip_m == pytest.approx(exact.peak_displacement_m, rel=1e-4)
+        assert free_standing.time_s == pytest.approx(exact.stopped_s, abs=5e-4)
         assert (
-            abs(free.backward_rad - exact.peak_theta_rad)
-            < 3.0 * free.step_error.rotation_rad + 1e-7
+            abs(free_standing.backward_rad - exact.peak_theta_rad)
+            < 3.0 * free_standing.step_error.rotation_rad + 1e-7
         )
 
 
@@ -141,11 +141,11 @@ def test_free_fall() -> None:
     excited = excitation(GroundMotion(np.zeros(201), DT_S))
     x, y = block.centroid
     start = Release(0.0, Pose(0.0, (x + 0.5, y + 0.2), 0.5))
-    free = free_motion(site_of(case), excited, start)
+    free_standing = free_motion(site_of(case), excited, start)
     landed_s = math.sqrt(2.0 * 0.2 / 9.80665)
-    assert free.landed_s == pytest.approx(landed_s, abs=1e-3)
-    falling = free.history.time_s < landed_s - 1e-3
-    height = y + 0.2 - 0.5 * 9.80665 * free.history.time_s[falling] ** 2
-    assert free.history.centroid_m[falling, 1] == pytest.approx(height, abs=5e-4)
-    assert free.pose.centroid_m == pytest.approx((x + 0.5, y), abs=1e-9)
-    assert free.outcome is Outcome.STABLE
+    assert free_standing.landed_s == pytest.approx(landed_s, abs=1e-3)
+    falling = free_standing.history.time_s < landed_s - 1e-3
+    height = y + 0.2 - 0.5 * 9.80665 * free_standing.history.time_s[falling] ** 2
+    assert free_standing.history.centroid_m[falling, 1] == pytest.approx(height, abs=5e-4)
+    assert free_standing.pose.centroid_m == pytest.approx((x + 0.5, y), abs=1e-9)
+    assert free_standing.outcome is Outcome.STABLE

@@ -30,25 +30,25 @@ def paths() -> list[LostContact]:
 
 
 def test_the_springs_are_as_stiff_as_need_be(paths: list[LostContact]) -> None:
-    for each in paths[::5]:
+    for item in paths[::5]:
         hard, harder = (
-            np.array(each.differences(each.on_springs(factor * STIFFNESS))) for factor in (1.0, 6.0)
+            np.array(item.differences(item.on_springs(factor * STIFFNESS))) for factor in (1.0, 6.0)
         )
         apart = float(np.abs(harder - hard).max())
-        assert apart < 2e-3 * each.greatest + ELASTIC_M
-        assert each.answer.error_estimate is not None
-        assert apart < 0.2 * each.answer.error_estimate + ELASTIC_M
+        assert apart < 2e-3 * item.greatest + ELASTIC_M
+        assert item.answer.error_estimate is not None
+        assert apart < 0.2 * item.answer.error_estimate + ELASTIC_M
 
 
 def test_the_estimate_covers_the_error_after_a_lost_contact(paths: list[LostContact]) -> None:
     covered = by_a_hundredth = 0
-    for each in paths:
-        error = each.answer.error_estimate
+    for path in paths:
+        error = path.answer.error_estimate
         if error is None:  # whether it fails is open
             continue
-        springs = each.on_springs()
-        covered += each.is_covered(springs, error)
-        by_a_hundredth += each.is_covered(springs, 0.01 * error)
+        springs = path.on_springs()
+        covered += path.is_covered(springs, error)
+        by_a_hundredth += path.is_covered(springs, 0.01 * error)
     assert len(paths) == sum(COUNTS.values()) == 30
     assert covered >= COVERED_LEAST
     # an estimate that is never needed would cover as many
@@ -56,15 +56,19 @@ def test_the_estimate_covers_the_error_after_a_lost_contact(paths: list[LostCont
 
 
 def test_the_error_goes_on_into_the_next_motion(paths: list[LostContact]) -> None:
-    each = next(path for path in paths if path.sort == SORTS[2])
-    assert each.answer.error_estimate is not None
-    assert each.answer.state is not None
-    assert each.answer.state.error == each.answer.error_estimate
-    planes = {"beta_deg": each.beta_deg, "phi_deg": each.phi_deg, "phi_back_deg": each.phi_back_deg}
-    both = respond([each.motion, each.motion], block=each.block, **planes)
+    separate = next(path for path in paths if path.sort == SORTS[2])
+    assert separate.answer.error_estimate is not None
+    assert separate.answer.state is not None
+    assert separate.answer.state.error == separate.answer.error_estimate
+    planes = {
+        "beta_deg": separate.beta_deg,
+        "phi_deg": separate.phi_deg,
+        "phi_back_deg": separate.phi_back_deg,
+    }
+    both = respond([separate.motion, separate.motion], block=separate.block, **planes)
     second = both.parts[1].response
     assert second.error_estimate is not None
-    assert second.error_estimate > each.answer.error_estimate
+    assert second.error_estimate > separate.answer.error_estimate
     assert both.error_estimate == second.error_estimate
 
 
@@ -93,12 +97,12 @@ def slid_m(height_m: float, vx: float, friction: float, law: tuple[float, float]
 def test_the_error_is_what_other_laws_make_of_a_fall() -> None:
     # light friction, so that the cube does not tip as it stops
     height_m, vx, friction = 0.02, 0.5, 0.1
-    free = slides_on(height_m, vx, friction=friction)
+    free_standing = slides_on(height_m, vx, friction=friction)
     rigid = slid_m(height_m, vx, friction, (0.0, 1.0))
-    assert free.outcome is Outcome.STABLE
-    assert free.slip_m == pytest.approx(rigid, rel=1e-3)
-    others = [slid_m(height_m, vx, friction, law) for law in OTHER_LAWS]
-    apart = max(abs(other - rigid) for other in others)
-    assert free.error is not None
-    assert free.error.displacement_m == pytest.approx(apart, rel=0.05)
-    assert free.step_error.displacement_m < 0.02 * apart
+    assert free_standing.outcome is Outcome.STABLE
+    assert free_standing.slip_m == pytest.approx(rigid, rel=1e-3)
+    rest = [slid_m(height_m, vx, friction, law) for law in OTHER_LAWS]
+    apart = max(abs(other - rigid) for other in rest)
+    assert free_standing.error is not None
+    assert free_standing.error.displacement_m == pytest.approx(apart, rel=0.05)
+    assert free_standing.step_error.displacement_m < 0.02 * apart

@@ -28,7 +28,7 @@ def reversal(r: float) -> GroundMotion:
     return sine_lobes(0.25, (1.0, -r) if r else (1.0,), SAMPLES)
 
 
-def found(motion: GroundMotion, p2: float) -> CriticalResult:
+def critical_of(motion: GroundMotion, p2: float) -> CriticalResult:
     result = critical(motion, p2=p2)
     assert result.status == "found"
     assert result.kr_over_pga is not None
@@ -43,7 +43,7 @@ def found(motion: GroundMotion, p2: float) -> CriticalResult:
 
 def boundary_peak(r: float) -> float:
     """Peak over the critical angle of the weakest block that stays."""
-    result = found(reversal(r), 2.0)
+    result = critical_of(reversal(r), 2.0)
     assert result.upper is not None
     run = respond(reversal(r), p2=2.0, kr=result.upper * result.pga_g * (1.0 + 1e-12))
     assert run.outcome is Outcome.STABLE
@@ -55,7 +55,7 @@ def boundary_peak(r: float) -> float:
     ("r", "kr"), [(0.0, 0.19071), (0.35, 0.14338), (0.65, 0.10305), (1.0, 0.05636), (1.25, 0.02328)]
 )
 def test_critical_kr_of_reversal_pulses(r: float, kr: float) -> None:
-    assert found(reversal(r), 2.0).kr == pytest.approx(kr, abs=6e-6)
+    assert critical_of(reversal(r), 2.0).kr == pytest.approx(kr, abs=6e-6)
 
 
 def test_a_block_can_pass_its_critical_angle_and_come_back() -> None:
@@ -72,7 +72,7 @@ def test_reversal_that_brings_back_a_block_from_beyond_its_critical_angle() -> N
 def test_the_linear_critical_angle_lies_above_except_at_r_1_25() -> None:
     for r in (0.0, 0.35, 0.65, 1.0):
         linear = critical_angle(reversal(r), p2=2.0)
-        kr = found(reversal(r), 2.0).kr
+        kr = critical_of(reversal(r), 2.0).kr
         assert linear is not None
         assert kr is not None
         assert 0.0 < math.tan(linear) / kr - 1.0 < 0.18
@@ -99,7 +99,7 @@ def test_rectangular_full_cycle_of_1_g(
     assert linear == pytest.approx(theta_c, abs=6e-5)
     assert linear is not None
     assert math.tan(linear) == pytest.approx(tan_ratio, abs=6e-5)
-    assert found(wave, p2).kr_over_pga == pytest.approx(kr_over_pga, abs=6e-5)
+    assert critical_of(wave, p2).kr_over_pga == pytest.approx(kr_over_pga, abs=6e-5)
 
 
 @pytest.mark.parametrize("velocity_m_s", [0.05, 0.5, 2.0, 5.0])

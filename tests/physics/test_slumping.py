@@ -53,8 +53,8 @@ def test_coefficients_to_the_printed_digits(row: tuple[float, ...]) -> None:
     else:
         equation = slumping.equation(site, 1.0)
         assert slumping.equation(site, -1.0).threshold(0.0) == pytest.approx(back, abs=0.51e-6)
-    found = (*coefficients(equation, 0.0), *coefficients(equation, 0.1))
-    assert found == pytest.approx(rest, abs=0.51e-6)
+    result = (*coefficients(equation, 0.0), *coefficients(equation, 0.1))
+    assert result == pytest.approx(rest, abs=0.51e-6)
 
 
 @pytest.mark.parametrize(
@@ -65,11 +65,11 @@ def test_the_strength_at_rest_is_the_yield_of_the_mode(
     a1: float, a3: float, phi: float, back: float, beta: float
 ) -> None:
     block = Block.from_angles(a1, a3, 0.7)
-    found = stability(block, beta_deg=beta, phi_deg=phi, phi_back_deg=back)
+    result = stability(block, beta_deg=beta, phi_deg=phi, phi_back_deg=back)
     site = on_planes(block, beta, phi, back)
-    slumps = found.mode == "slump"
+    slumps = result.mode == "slump"
     equation = slumping.equation(site, 1.0) if slumps else confined_toppling.equation(site)
-    assert equation.threshold(0.0) == pytest.approx(found.yield_acceleration, rel=1e-12)
+    assert equation.threshold(0.0) == pytest.approx(result.yield_acceleration, rel=1e-12)
 
 
 def test_size_scales_time_alone() -> None:

@@ -45,7 +45,7 @@ def random_cases(seed: int, count: int) -> list[statics.Case]:
     return cases
 
 
-def answer(case: statics.Case, **others: object) -> Stability:
+def answer(case: statics.Case, **rest: object) -> Stability:
     block = Block.from_angles(case.a1, case.a3, float(np.hypot(*case.toe)))
     return stability(
         block,
@@ -53,12 +53,12 @@ def answer(case: statics.Case, **others: object) -> Stability:
         phi_deg=case.phi1,
         phi_back_deg=case.phi2,
         kv=case.kv,
-        **others,  # type: ignore[arg-type]
+        **rest,  # type: ignore[arg-type]
     )
 
 
 def admissible_and_yield(case: statics.Case, mode: str) -> tuple[bool, float]:
-    """Whether the forces of a mode can act and its motion can happen, and k."""
+    """Return whether the forces of a mode can act and its motion can happen, and k."""
     slack = 1e-9
     if mode == "slide":
         normal, place, k = statics.slide(case)
@@ -83,15 +83,15 @@ def close(a: float, b: float) -> bool:
 def test_every_mode_is_admissible_and_its_yield_solves_the_equilibrium() -> None:
     seen: Counter[tuple[str, str]] = Counter()
     for case in random_cases(11, BLOCKS):
-        found = answer(case)
-        seen[found.mode, found.state] += 1
-        admissible, k = admissible_and_yield(case, found.mode)
-        if math.isfinite(found.yield_acceleration):
-            assert admissible, (case, found)
-            assert close(found.yield_acceleration, k), (case, found, k)
+        document = answer(case)
+        seen[document.mode, document.state] += 1
+        admissible, k = admissible_and_yield(case, document.mode)
+        if math.isfinite(document.yield_acceleration):
+            assert admissible, (case, document)
+            assert close(document.yield_acceleration, k), (case, document, k)
         else:
             # forces that oppose gravity exist for no horizontal acceleration
-            assert not admissible, (case, found)
+            assert not admissible, (case, document)
     for mode in ("slide", "topple", "slump", "confined_topple"):
         assert seen[mode, "stable"] > 50, seen
         assert seen[mode, "unstable"] > 20, seen
@@ -100,14 +100,14 @@ def test_every_mode_is_admissible_and_its_yield_solves_the_equilibrium() -> None
 
 def test_sliding_yield_is_given_for_every_mode() -> None:
     for case in random_cases(12, 300):
-        found = answer(case)
-        if math.isfinite(found.ky):
+        document = answer(case)
+        if math.isfinite(document.ky):
             _, _, k = statics.slide(case)
-            assert close(found.ky, k)
+            assert close(document.ky, k)
 
 
 def is_unique(case: statics.Case, mode: str) -> bool:
-    """Whether no wedge and no hang-up can hold the block beyond the mechanism."""
+    """Return whether no wedge and no hang-up can hold the block beyond the mechanism."""
     corner = case.gamma + case.phi1 + case.phi2
     rough_back = case.phi2 > case.phi1 + case.gamma - UNIQUE_BY
     if mode in ("slide", "confined_topple"):
@@ -120,31 +120,31 @@ def is_unique(case: statics.Case, mode: str) -> bool:
 def test_limit_analysis_finds_the_same_mode_and_yield() -> None:
     agreed: Counter[str] = Counter()
     for case in random_cases(13, BLOCKS):
-        found = answer(case)
-        if not is_unique(case, found.mode):
+        document = answer(case)
+        if not is_unique(case, document.mode):
             continue
-        k = found.yield_acceleration
+        k = document.yield_acceleration
         limit = statics.limit_of_equilibrium(case)
         if limit is None:
-            assert not math.isfinite(k) or abs(k) > 1e3, (case, found)
+            assert not math.isfinite(k) or abs(k) > 1e3, (case, document)
             continue
-        assert math.isfinite(k), (case, found, limit)
-        assert close(k, limit.k), (case, found, limit)
-        agreed[found.mode] += 1
+        assert math.isfinite(k), (case, document, limit)
+        assert close(k, limit.k), (case, document, limit)
+        agreed[document.mode] += 1
         # the contacts that carry load name the mode
         tiny = 1e-7
-        if found.mode == "topple":
+        if document.mode == "topple":
             assert limit.heel < tiny
             assert limit.back_high < tiny
-        elif found.mode == "slump":
+        elif document.mode == "slump":
             assert limit.toe < tiny
             assert limit.back_low < tiny
-        elif found.mode == "confined_topple":
+        elif document.mode == "confined_topple":
             assert limit.heel < tiny
             assert limit.back_high < tiny
         else:
             assert limit.back_low + limit.back_high < tiny
-        if found.mode != "topple":
+        if document.mode != "topple":
             assert limit.base_shear_left < tiny  # friction of the base is fully used
     assert sum(agreed.values()) > 1000
     assert min(agreed[mode] for mode in ("slide", "slump", "confined_topple")) > 50
@@ -154,17 +154,20 @@ def test_limit_analysis_finds_the_same_mode_and_yield() -> None:
 def test_limit_analysis_without_a_back_plane() -> None:
     agreed: Counter[str] = Counter()
     for case in random_cases(14, 600):
-        found = answer(case, back_fracture=False)
+        document = answer(case, back_fracture=False)
         limit = statics.limit_of_equilibrium(case, back_plane=False)
         stands = case.a1 <= case.beta and case.a1 <= case.phi1
         if not stands:
             # its weight passes upslope of the heel, or it slides
-            assert found.state == "unstable" or found.yield_acceleration <= 1e-12, (case, found)
-        elif limit is not None and math.isfinite(found.yield_acceleration):
-            assert close(found.yield_acceleration, limit.k), (case, found, limit)
-            agreed[found.mode] += 1
+            assert document.state == "unstable" or document.yield_acceleration <= 1e-12, (
+                case,
+                document,
+            )
+        elif limit is not None and math.isfinite(document.yield_acceleration):
+            assert close(document.yield_acceleration, limit.k), (case, document, limit)
+            agreed[document.mode] += 1
         if case.a1 > case.phi1:
-            assert found.state == "unstable"
+            assert document.state == "unstable"
     assert agreed["slide"] > 50
     assert agreed["topple"] > 50
 
@@ -203,21 +206,21 @@ def test_polygons_whole_and_with_a_broken_heel() -> None:
     agreed: Counter[str] = Counter()
     for _ in range(1200):
         block, case = random_polygon(random)
-        found = stability(block, beta_deg=case.beta, phi_deg=case.phi1, phi_back_deg=case.phi2)
-        k = found.yield_acceleration
-        if found.mode == "confined_topple":
+        result = stability(block, beta_deg=case.beta, phi_deg=case.phi1, phi_back_deg=case.phi2)
+        k = result.yield_acceleration
+        if result.mode == "confined_topple":
             r_base, r_back, solved = statics.two_contacts(case, case.toe, case.lowest, -1)
             if math.isfinite(k):
                 assert min(r_base, r_back) > 0.0
                 assert close(k, solved)
-        elif found.mode == "slump" and math.isfinite(k):
+        elif result.mode == "slump" and math.isfinite(k):
             r_base, r_back, solved = statics.slump(case)
             assert min(r_base, r_back) > 0.0
             assert close(k, solved)
         limit = statics.limit_of_equilibrium(case)
-        if limit is not None and math.isfinite(k) and is_unique(case, found.mode):
-            assert close(k, limit.k), (case, found, limit)
-            agreed[found.mode] += 1
+        if limit is not None and math.isfinite(k) and is_unique(case, result.mode):
+            assert close(k, limit.k), (case, result, limit)
+            agreed[result.mode] += 1
     assert min(agreed.values()) > 10
     assert len(agreed) == 4
 
@@ -229,19 +232,19 @@ def test_cohesion_of_the_base_in_every_mode(share: float) -> None:
         block = Block.from_angles(case.a1, case.a3, float(np.hypot(*case.toe)))
         density = 2500.0
         cohesion = share * density * 9.80665 * block.s1_m
-        found = answer(case, cohesion_pa=cohesion, density_kg_m3=density)
-        if not math.isfinite(found.yield_acceleration) or abs(found.yield_acceleration) > 1e3:
+        document = answer(case, cohesion_pa=cohesion, density_kg_m3=density)
+        if not math.isfinite(document.yield_acceleration) or abs(document.yield_acceleration) > 1e3:
             continue
         bonded = replace(case, bond=share)
-        if found.mode == "slide":
+        if document.mode == "slide":
             normal, place, k = statics.slide(bonded)
             if normal <= 0.0:
                 continue
             assert case.heel[0] - 1e-9 <= place <= case.toe[0] + 1e-9
-        elif found.mode == "topple":
+        elif document.mode == "topple":
             shear, normal, k = statics.topple(bonded)
             assert -shear <= normal * math.tan(math.radians(case.phi1)) + share + 1e-9
-        elif found.mode == "slump":
+        elif document.mode == "slump":
             r_base, r_back, k = statics.slump(bonded)
             if r_base <= 0.0:
                 continue
@@ -251,7 +254,7 @@ def test_cohesion_of_the_base_in_every_mode(share: float) -> None:
             if r_base <= 0.0:
                 continue
             assert r_back > -1e-9
-        assert close(found.yield_acceleration, k), (case, found, k)
-        seen[found.mode] += 1
+        assert close(document.yield_acceleration, k), (case, document, k)
+        seen[document.mode] += 1
     assert min(seen.values()) > 20
     assert len(seen) == 4

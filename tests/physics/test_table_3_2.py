@@ -47,7 +47,7 @@ class Model:
 
     @property
     def decided(self) -> bool:
-        """Whether statics alone has one answer: no wedge or hang-up holds more than the mode."""
+        """True if statics alone has one answer: no wedge or hang-up holds more than the mode."""
         return is_unique(self.case, self.stability.mode)
 
     def limit_g(self) -> float:

@@ -18,13 +18,12 @@ from rbfrag import (
     stability,
     stability_arrays,
 )
-from rbfrag.solver.contacts import corner_at
 from rbfrag.solver.excitation import excitation
-from rbfrag.solver.free_motion import Release, free_motion
+from rbfrag.solver.free_motion import Release, corner_at, free_motion
 from rbfrag.solver.integrator.one_freedom.equation import Pose
 from rbfrag.solver.kind import SupportedBlock
 from rbfrag.solver.stability.joint import IS_DRAINED, STAYS_UNDRAINED
-from rbfrag.solver.stability.toe_stability import moment_about_toe, toe_needs_deg
+from rbfrag.solver.stability.validity import moment_about_toe, toe_needs_deg
 from rbfrag.solver.toppling_run import respond as topple
 from tests.physics.pulses import half_sines, rectangle, smooth_noise
 
@@ -115,15 +114,17 @@ def test_a_wet_topple_is_conservative_by_up_to_two_per_cent(
 ) -> None:  # fmt: skip
     """(k_r wet, p²) against the constant moment: θ'' = p² [k cos(θc - θ) - sin(θc - θ) + m0]."""
     block = Block.rectangle(height_m, width_m)
-    found = stability(block, beta_deg=beta_deg, phi_deg=45.0, water_m=water_m, density_kg_m3=2700.0)
-    assert found.kr == pytest.approx(kr, abs=1e-6)
+    result = stability(
+        block, beta_deg=beta_deg, phi_deg=45.0, water_m=water_m, density_kg_m3=2700.0
+    )
+    assert result.kr == pytest.approx(kr, abs=1e-6)
     time_s = np.linspace(0.0, period_s, 401)
     wave = np.sin(2.0 * np.pi * time_s / period_s)
 
     def topples(amplitude: float) -> bool:
         motion = GroundMotion(amplitude * wave, period_s / 400)
-        assert found.kr is not None
-        return topple(motion, p2=block.p2, kr=found.kr).outcome == "toppled"
+        assert result.kr is not None
+        return topple(motion, p2=block.p2, kr=result.kr).outcome == "toppled"
 
     low, high = 0.5 * amplitude_g, 2.0 * amplitude_g
     while high - low > 1e-5 * amplitude_g:
@@ -131,13 +132,13 @@ def test_a_wet_topple_is_conservative_by_up_to_two_per_cent(
         low, high = (low, middle) if topples(middle) else (middle, high)
     assert -0.02 <= high / amplitude_g - 1.0 <= 0.0
     # and the reference itself, by an integrator that shares nothing with this one
-    theta_c, m0 = math.radians(block.alpha3_deg - beta_deg), moment_about_toe(block, found.push)
+    theta_c, m0 = math.radians(block.alpha3_deg - beta_deg), moment_about_toe(block, result.push)
 
     def falls(amplitude: float) -> bool:
         def rates(t: float, y: list[float]) -> list[float]:
             k = amplitude * math.sin(2.0 * math.pi * t / period_s) if t < period_s else 0.0
-            left = theta_c - y[0]
-            return [y[1], block.p2 * (k * math.cos(left) - math.sin(left) + m0)]
+            remaining = theta_c - y[0]
+            return [y[1], block.p2 * (k * math.cos(remaining) - math.sin(remaining) + m0)]
 
         begins = math.asin(kr / amplitude) * period_s / (2.0 * math.pi)
 
@@ -188,9 +189,9 @@ def test_wet_blocks_on_two_contacts(
     # the free body with the same push, which knows nothing of mechanisms
     site = SupportedBlock.of(block, judged, judged.mode, {})
     release = Release(0.0, Pose(0.0, corner_at((0.0, 0.0), 0.0, block.centroid), 0.0))
-    free = free_motion(site, excitation(motion), release)
-    error = free.step_error.rotation_rad
-    peak = max(free.backward_rad, free.forward_rad)
+    free_standing = free_motion(site, excitation(motion), release)
+    error = free_standing.step_error.rotation_rad
+    peak = max(free_standing.backward_rad, free_standing.forward_rad)
     assert peak == pytest.approx(peak_rad, abs=2.0 * error + 1e-6)
 
 
@@ -211,9 +212,9 @@ def test_the_toe_of_a_wet_block(
         judged = stability(block, phi_deg=needs_deg - less_deg, **on)
         site = SupportedBlock.of(block, judged, judged.mode, {})
         release = Release(0.0, Pose(0.0, block.centroid, 0.0))
-        free = free_motion(site, excitation(step), release, at_toe=True)
-        at_once = free.history.time_s < 0.01
-        assert (abs(free.history.slip_m[at_once]).max() > 1e-8) == slips
+        free_standing = free_motion(site, excitation(step), release, at_toe=True)
+        at_once = free_standing.history.time_s < 0.01
+        assert (abs(free_standing.history.slip_m[at_once]).max() > 1e-8) == slips
 
 
 def test_arrays_have_the_drained_bound_too() -> None:

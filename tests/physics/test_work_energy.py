@@ -153,16 +153,16 @@ WEDGE = on_planes(WEDGE_BLOCK, 12, 35, 33, two_way=True)
 SLIDE = on_planes(Block.from_angles(-20, 60, 1.0), 15, 30, 30, two_way=True)
 
 CASES: dict[str, tuple[Mechanism, Laws, Excitation]] = {
-    "sliding": (sliding.mechanism(SLIDE), slide_laws(SLIDE), shaking(1, 0.6, 0.3)),
+    "sliding": (sliding.MODEL.mechanism(SLIDE), slide_laws(SLIDE), shaking(1, 0.6, 0.3)),
     "slumping": (
-        slumping.mechanism(SLUMP),
+        slumping.MODEL.mechanism(SLUMP),
         two_contacts(
             SLUMP_BLOCK, SLUMP, clockwise=False, base=SLUMP_BLOCK.heel, back=SLUMP_BLOCK.back
         ),
         shaking(2, 1.0, 0.3),
     ),
     "confined toppling": (
-        confined_toppling.mechanism(WEDGE),
+        confined_toppling.MODEL.mechanism(WEDGE),
         two_contacts(
             WEDGE_BLOCK, WEDGE, clockwise=True, base=WEDGE_BLOCK.toe, back=WEDGE_BLOCK.heel
         ),
@@ -178,13 +178,13 @@ def test_work_balances_energy(name: str) -> None:
     assert run.started_s is not None
     travel = run.history
     assert travel is not None
-    here = np.ones(travel.time_s.size, dtype=bool)
+    local = np.ones(travel.time_s.size, dtype=bool)
     if run.changes:
         # up to the first standstill, after which the block rocks about its toe
-        here = travel.time_s <= run.changes[0].time_s
+        local = travel.time_s <= run.changes[0].time_s
     else:
         assert run.outcome is Outcome.STABLE
-    time, x, rate = travel.time_s[here], travel.x[here], travel.rate[here]
+    time, x, rate = travel.time_s[local], travel.x[local], travel.rate[local]
     h = np.diff(time)
     moving = (h > 0.0) & (np.diff(x) != 0.0)
     assert moving.sum() > 200
@@ -229,8 +229,8 @@ def test_work_balances_energy_while_a_block_rocks() -> None:
     h = h[moving]
 
     def pull(theta: FloatArray, k: FloatArray, w: FloatArray) -> FloatArray:
-        left = math.atan(kr) - theta
-        torque: FloatArray = p2 * (k * np.cos(left) - w * np.sin(left))
+        remaining = math.atan(kr) - theta
+        torque: FloatArray = p2 * (k * np.cos(remaining) - w * np.sin(remaining))
         return torque
 
     k0, k1, w0, w1 = (

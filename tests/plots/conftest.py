@@ -3,48 +3,44 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from types import ModuleType
 from typing import Any
 
 import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
+from rbfrag.plots import canvas
+
 
 @pytest.fixture
-def caught(monkeypatch: pytest.MonkeyPatch) -> Callable[[ModuleType], list[Figure]]:
-    """Return a function that keeps the figures a module saves from now on."""
+def figures(monkeypatch: pytest.MonkeyPatch) -> list[Figure]:
+    """The figures that are saved from now on."""
+    saved: list[Figure] = []
+    save: Callable[..., Any] = canvas.save_figure
 
-    def watch(module: ModuleType) -> list[Figure]:
-        figures: list[Figure] = []
-        home = getattr(module, "canvas", module)
-        save: Callable[..., Any] = home.save_figure
+    def keep(figure: Figure, path: object) -> object:
+        saved.append(figure)
+        return save(figure, path)
 
-        def keep(figure: Figure, path: object) -> object:
-            figures.append(figure)
-            return save(figure, path)
-
-        monkeypatch.setattr(home, "save_figure", keep)
-        return figures
-
-    return watch
+    monkeypatch.setattr(canvas, "save_figure", keep)
+    return saved
 
 
 def overlaps(figure: Figure, texts: list[Any]) -> list[tuple[str, str]]:
     """Return the pairs of texts that cover each other, and those that leave the sheet."""
-    canvas = FigureCanvasAgg(figure)
-    canvas.draw()
-    renderer = canvas.get_renderer()
+    agg = FigureCanvasAgg(figure)
+    agg.draw()
+    renderer = agg.get_renderer()
     boxes = [(t.get_text(), t.get_window_extent(renderer)) for t in texts if t.get_text()]
     sheet = figure.bbox.padded(1.0)
-    found = [
+    results = [
         (name, "the edge")
         for name, box in boxes
         if not (sheet.contains(*box.min) and sheet.contains(*box.max))
     ]
     for i, (name, box) in enumerate(boxes):
-        found += [(name, other) for other, its in boxes[i + 1 :] if box.overlaps(its)]
-    return found
+        results += [(name, other) for other, its in boxes[i + 1 :] if box.overlaps(its)]
+    return results
 
 
 @pytest.fixture

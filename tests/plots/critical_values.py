@@ -18,8 +18,8 @@ def critical_values(n: int = N) -> CombinationTable:
     random = np.random.default_rng(6)
     pgv = np.exp(random.uniform(-4, 0.3, n))
     y = np.abs(0.72 * pgv + random.normal(size=n) * np.sqrt(1e-4 + 2e-3 * pgv))
-    found = np.arange(n) % 10 != 0
-    keep = np.where(found, 1.0, np.nan)
+    result = np.arange(n) % 10 != 0
+    keep = np.where(result, 1.0, np.nan)
     p2 = random.choice([30.0, 3.0, 0.3], n)
     tm = np.exp(random.uniform(-2, 0.5, n))
     ratio = 2.0 * np.pi / (tm * np.sqrt(p2))
@@ -30,7 +30,7 @@ def critical_values(n: int = N) -> CombinationTable:
         event_guessed=np.zeros(n, dtype=bool),
         polarity=np.full(n, "forward", dtype=object),
         p2=p2,
-        status=np.where(found, "found", "below_limit").astype(object),
+        status=np.where(result, "found", "below_limit").astype(object),
         search_limit=np.full(n, 0.01),
         kr_over_pga=keep * np.minimum(1.2 / ratio, 0.9),
         upper=np.full(len(p2), np.nan),

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from rbfrag.plots.blocks.block import block_lines
+from rbfrag.plots.block import block_lines
 from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.stability.single import stability
 
@@ -48,7 +48,7 @@ def test_the_resultant_at_yield_points_at_the_toe_of_a_block_that_topples():
 
 
 def test_a_block_without_a_back_plane_has_two_contacts_and_one_plane():
-    found = stability(BLOCK, beta_deg=BETA_DEG, phi_deg=38.0, back_fracture=False)
-    lines = block_lines(BLOCK, found)
+    judgement = stability(BLOCK, beta_deg=BETA_DEG, phi_deg=38.0, back_fracture=False)
+    lines = block_lines(BLOCK, judgement)
     assert set(lines.contacts) == {"1", "3"}
     assert len(lines.planes) == 2

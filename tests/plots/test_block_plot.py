@@ -9,8 +9,7 @@ import pytest
 from matplotlib.patches import Polygon
 
 from rbfrag.errors import InputError
-from rbfrag.plots.blocks import block as module
-from rbfrag.plots.blocks.block import plot_block
+from rbfrag.plots.block import plot_block
 from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.stability.single import stability
 
@@ -40,15 +39,14 @@ CASES = {
 
 
 @pytest.mark.parametrize("case", CASES)
-def test_the_drawing_is_the_block_turned_into_the_slope(case, tmp_path, caught, overlapping):
-    figures = caught(module)
+def test_the_drawing_is_the_block_turned_into_the_slope(case, tmp_path, figures, overlapping):
     block, conditions = CASES[case]
-    found = stability(block, **conditions)
-    assert case.startswith(found.mode.replace("_", " "))
-    plot_block(block, found, tmp_path / "a.png")
+    judgement = stability(block, **conditions)
+    assert case.startswith(judgement.mode.replace("_", " "))
+    plot_block(block, judgement, tmp_path / "a.png")
     (figure,) = figures
     axes, panel = figure.axes
-    assert found.mode.replace("_", " ") in figure.get_suptitle()
+    assert judgement.mode.replace("_", " ") in figure.get_suptitle()
     assert axes.get_aspect() == 1.0
 
     rock, drawn = (p.get_xy() for p in axes.patches if isinstance(p, Polygon))
@@ -71,17 +69,16 @@ def test_the_drawing_is_the_block_turned_into_the_slope(case, tmp_path, caught, 
     assert (
         overlapping(figure, [*axes.texts, *panel.texts, axes.xaxis.label, axes.yaxis.label]) == []
     )
-    left, right = axes.get_xlim()
-    ticks = [t.label1 for t in axes.xaxis.get_major_ticks() if left <= t.get_loc() <= right]
+    x_left, right = axes.get_xlim()
+    ticks = [t.label1 for t in axes.xaxis.get_major_ticks() if x_left <= t.get_loc() <= right]
     assert overlapping(figure, ticks) == []
 
 
-def test_the_resultant_of_a_topple_runs_through_the_toe(tmp_path, caught):
-    figures = caught(module)
+def test_the_resultant_of_a_topple_runs_through_the_toe(tmp_path, figures):
     block, conditions = TOPPLE
     for kv in (0.0, 0.3):
-        found = stability(block, **conditions, kv=kv)
-        plot_block(block, found, tmp_path / "a.svg")
+        judgement = stability(block, **conditions, kv=kv)
+        plot_block(block, judgement, tmp_path / "a.svg")
         (arrow,) = [t for t in figures[-1].axes[0].texts if t.arrow_patch is not None]
         x, y = arrow.xy
         beta = math.radians(conditions["beta_deg"])
@@ -90,12 +87,11 @@ def test_the_resultant_of_a_topple_runs_through_the_toe(tmp_path, caught):
         assert x / y == pytest.approx(toe_x / toe_y, rel=1e-12)
 
 
-def test_a_locked_block_shows_its_weight(tmp_path, caught):
-    figures = caught(module)
+def test_a_locked_block_shows_its_weight(tmp_path, figures):
     block, conditions = LOCKED
-    found = stability(block, **conditions)
-    assert found.state == "locked"
-    plot_block(block, found, tmp_path / "a.pdf")
+    judgement = stability(block, **conditions)
+    assert judgement.state == "locked"
+    plot_block(block, judgement, tmp_path / "a.pdf")
     axes, panel = figures[0].axes
     (arrow,) = [t for t in axes.texts if t.arrow_patch is not None]
     assert arrow.xy[0] == 0.0

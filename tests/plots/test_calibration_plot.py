@@ -8,11 +8,9 @@ import numpy as np
 import pytest
 
 from rbfrag.errors import InputError
-from rbfrag.fragility.fit.scores import CalibrationBins
-from rbfrag.plots import calibration as calibration_module
-from rbfrag.plots import critical_strength as vertical_module
-from rbfrag.plots.calibration import plot_calibration
+from rbfrag.fragility.fit.result import CalibrationBins
 from rbfrag.plots.critical_strength import plot_vertical, vertical_pairs
+from rbfrag.plots.fit import plot_calibration
 from tests.plots.critical_values import N, critical_values
 
 P = np.array([0.02, 0.3, 0.7, 0.98])
@@ -26,8 +24,7 @@ BINS = CalibrationBins(
 )
 
 
-def test_calibration_shows_shares_and_counts(tmp_path, caught, overlapping) -> None:
-    figures = caught(calibration_module)
+def test_calibration_shows_shares_and_counts(tmp_path, figures, overlapping) -> None:
     scores = {"a": {"log_loss_held_out": 0.155, "brier_held_out": 0.047}}
     plot_calibration({"a": BINS, "b": BINS}, tmp_path / "c.png", scores=scores, data="made up")
     axes, below = figures[0].axes
@@ -46,8 +43,7 @@ def test_calibration_of_too_many_is_rejected(tmp_path) -> None:
         plot_calibration(dict.fromkeys("abcde", BINS), tmp_path / "c.png")
 
 
-def test_vertical_shows_every_pair(tmp_path, caught, overlapping) -> None:
-    figures = caught(vertical_module)
+def test_vertical_shows_every_pair(tmp_path, figures, overlapping) -> None:
     without = critical_values()
     random = np.random.default_rng(0).normal(size=N)
     shaken = replace(without, kr_over_pga=without.kr_over_pga * np.exp(0.05 * random))

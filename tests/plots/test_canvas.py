@@ -6,7 +6,7 @@ from matplotlib import rc_context, rcParams
 
 from rbfrag.errors import InputError
 from rbfrag.motions.ground_motion import GroundMotion
-from rbfrag.plots import plot, rotation
+from rbfrag.plots import plot
 from rbfrag.plots.canvas import new_figure, plot_path, save_figure, written_numbers
 from rbfrag.solver.block.geometry import Block
 
@@ -68,17 +68,16 @@ try:
 except MissingExtraError as error:
     print(error)
 """
-    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
-    assert "pip install 'rbfrag[plot]'" in done.stdout, done.stderr
+    process = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
+    assert "pip install 'rbfrag[plot]'" in process.stdout, process.stderr
 
 
-def test_figures_do_not_depend_on_the_settings_of_the_user(tmp_path, caught):
-    figures = caught(rotation)
+def test_figures_do_not_depend_on_the_settings_of_the_user(tmp_path, figures):
     block = Block.from_angles(45.0, 65.0, 1.0)
     mine = {"text.usetex": True, "axes.facecolor": "black", "font.size": 30.0, "lines.color": "red"}
     for settings in ({}, mine):
         with rc_context(settings):
-            rotation.plot_rotation(block, tmp_path / "a.png", beta_deg=0.0, phi_deg=35.0)
+            plot.rotation(block, tmp_path / "a.png", beta_deg=0.0, phi_deg=35.0)
             assert rcParams["text.usetex"] is bool(settings)
     assert [figure.axes[0].xaxis.label.get_fontsize() for figure in figures] == [10.0, 10.0]
     assert [figure.axes[0].get_facecolor() for figure in figures] == [(1.0, 1.0, 1.0, 1.0)] * 2

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from rbfrag.errors import InputError
-from rbfrag.plots import chart as module
 from rbfrag.plots.chart import CONTOURS, plot_chart
 from rbfrag.question.question import predict
 from tests.plots.critical_values import straight_line_model
@@ -14,16 +13,16 @@ from tests.plots.critical_values import straight_line_model
 
 def ends_of_labels(axes) -> dict[str, tuple[float, float]]:
     """Return where on the sheet the leader of each label ends, in its units."""
-    found = {}
+    results = {}
     leaders = {line.get_label()[1:]: line for line in axes.lines}
     for text in axes.texts:
         (across, beside), (up, place) = leaders[text.get_text()].get_data()
         assert abs(beside - text.get_position()[0]) < 0.01
         assert place == text.get_position()[1]
-        found[text.get_text()] = axes.transData.inverted().transform(
+        results[text.get_text()] = axes.transData.inverted().transform(
             axes.transAxes.transform((across, up))
         )
-    return found
+    return results
 
 
 @pytest.mark.parametrize("suffix", ["png", "svg", "pdf"])
@@ -32,8 +31,7 @@ def test_is_written(tmp_path, suffix) -> None:
     assert path.stat().st_size > 5000
 
 
-def test_lines_have_the_probabilities_written_on_them(tmp_path, caught) -> None:
-    figures = caught(module)
+def test_lines_have_the_probabilities_written_on_them(tmp_path, figures) -> None:
     model = straight_line_model()
     plot_chart(model, tmp_path / "c.png")
     axes = figures[0].axes[0]
@@ -44,8 +42,7 @@ def test_lines_have_the_probabilities_written_on_them(tmp_path, caught) -> None:
         assert 100.0 * answer.probability == pytest.approx(float(words.split()[0]), rel=1e-6)
 
 
-def test_labels_do_not_cover_each_other(tmp_path, caught, overlapping) -> None:
-    figures = caught(module)
+def test_labels_do_not_cover_each_other(tmp_path, figures, overlapping) -> None:
     for term in ("pgv", "pga_tm"):
         plot_chart(straight_line_model(term), tmp_path / "c.png")
         axes = figures[-1].axes[0]
@@ -53,8 +50,7 @@ def test_labels_do_not_cover_each_other(tmp_path, caught, overlapping) -> None:
         assert overlapping(figures[-1], texts) == []
 
 
-def test_labels_stand_in_the_order_of_their_lines(tmp_path, caught) -> None:
-    figures = caught(module)
+def test_labels_stand_in_the_order_of_their_lines(tmp_path, figures) -> None:
     plot_chart(straight_line_model(), tmp_path / "c.png")
     axes = figures[0].axes[0]
     ends = ends_of_labels(axes)
@@ -63,8 +59,7 @@ def test_labels_stand_in_the_order_of_their_lines(tmp_path, caught) -> None:
     assert by_place == by_line == [f"{100.0 * p:g} %" for p in reversed(CONTOURS)]
 
 
-def test_shading_starts_where_the_fit_ends(tmp_path, caught) -> None:
-    figures = caught(module)
+def test_shading_starts_where_the_fit_ends(tmp_path, figures) -> None:
     plot_chart(straight_line_model(), tmp_path / "c.png")
     axes = figures[0].axes[0]
     edges = sorted({float(v) for patch in axes.patches for v in np.ravel(patch.get_xy())})

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from rbfrag.plots.coast import draw_coast, world
+from rbfrag.plots.shakemap import draw_coast, world
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,6 @@ import pytest
 from rbfrag.errors import InputError
 from rbfrag.fragility import describe
 from rbfrag.fragility.model import FragilityModel
-from rbfrag.plots import curve as module
 from rbfrag.plots.curve import plot_curve
 from rbfrag.question.question import predict
 from tests.fragility.portfolio_draws import SHARED
@@ -19,8 +18,7 @@ from tests.plots.critical_values import straight_line_model
 BLOCK = {"p2": 3.0, "kr": 0.1}
 
 
-def test_curve_and_band_are_those_of_predict(tmp_path, caught) -> None:
-    figures = caught(module)
+def test_curve_and_band_are_those_of_predict(tmp_path, figures) -> None:
     model = straight_line_model()
     plot_curve(model, BLOCK, tmp_path / "c.png", level=0.9)
     axes = figures[0].axes[0]
@@ -33,14 +31,13 @@ def test_curve_and_band_are_those_of_predict(tmp_path, caught) -> None:
         assert inside[i] == answer.in_domain
         (interval,) = axes.collections  # no sites are asked for
         band = interval.get_paths()[0].vertices
-        here = band[np.isclose(band[:, 0], x[i], rtol=1e-12)][:, 1]
-        assert (here.min(), here.max()) == pytest.approx((answer.ci_low, answer.ci_high))
+        edges = band[np.isclose(band[:, 0], x[i], rtol=1e-12)][:, 1]
+        assert (edges.min(), edges.max()) == pytest.approx((answer.ci_low, answer.ci_high))
     assert y[-1] > 0.95
     assert "fitted on 360 critical values of 7 earthquakes" in axes.get_title()
 
 
-def test_the_range_at_some_sites_is_a_second_band(tmp_path, caught) -> None:
-    figures = caught(module)
+def test_the_range_at_some_sites_is_a_second_band(tmp_path, figures) -> None:
     row = replace(straight_line_model().row, dependence=SHARED)
     model = FragilityModel.from_row(row)
     plot_curve(model, BLOCK, tmp_path / "c.png", level=0.9, sites=5)
@@ -55,12 +52,11 @@ def test_the_range_at_some_sites_is_a_second_band(tmp_path, caught) -> None:
         (interval, (answer.ci_low, answer.ci_high)),
     ):
         outline = band.get_paths()[0].vertices
-        here = outline[np.isclose(outline[:, 0], x, rtol=1e-12)][:, 1]
-        assert (here.min(), here.max()) == pytest.approx(ends)
+        edges = outline[np.isclose(outline[:, 0], x, rtol=1e-12)][:, 1]
+        assert (edges.min(), edges.max()) == pytest.approx(ends)
 
 
-def test_other_measures_are_held(tmp_path, caught) -> None:
-    figures = caught(module)
+def test_other_measures_are_held(tmp_path, figures) -> None:
     plot_curve(straight_line_model("pga_tm"), BLOCK, tmp_path / "c.png", fixed={"tm_s": 0.5})
     axes = figures[0].axes[0]
     assert axes.get_xlabel() == "peak ground acceleration, PGA [g]"
@@ -73,8 +69,7 @@ def test_a_missing_measure_is_named(tmp_path) -> None:
     assert not list(tmp_path.iterdir())
 
 
-def test_as_many_curves_beside_it_as_styles_and_no_more(tmp_path, caught, overlapping) -> None:
-    figures = caught(module)
+def test_as_many_curves_beside_it_as_styles_and_no_more(tmp_path, figures, overlapping) -> None:
     names = [f"fragility {i} of a file with rather long names of $ states" for i in range(21)]
     compared = {name: lambda x: np.clip(x, 0.0, 1.0) for name in names}
     with pytest.raises(InputError, match=r"21 fragility functions .* maximum is 20"):

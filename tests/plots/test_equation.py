@@ -14,7 +14,7 @@ from rbfrag.fragility.method import SINGLE, TOPPLING_BLOCK
 from rbfrag.fragility.methods import method_named, method_names
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
-from rbfrag.plots.equation import equation_lines, rounded
+from rbfrag.plots.fit import equation_lines, rounded
 
 FORMS = [
     (name, term)
@@ -22,7 +22,7 @@ FORMS = [
     if method_named(name).block is TOPPLING_BLOCK
     for term in method_named(name).forms
 ]
-GIVEN = {
+EXPECTED = {
     "p2": 7.0, "kr": 0.11, "pgv_m_s": 0.8, "pga_g": 0.5, "tm_s": 0.6, "pgd_m": 0.3, "sa03_g": 0.9,
     "sa10_g": 0.6, "sa30_g": 0.2, "xp_m_s": 0.7,
 }  # fmt: skip
@@ -56,7 +56,7 @@ def test_it_gives_the_same_eta(method: str, term: str) -> None:
     head, *sums = [line.strip("$") for line in lines if "=" not in line or "eta" in line]
     printed = head.split(r"\eta/h = " if form.size_factor else r"\eta = ")[1] + "".join(sums)
 
-    v = TOPPLING_BLOCK.completed(GIVEN, TERMS[term], SINGLE)
+    v = TOPPLING_BLOCK.completed(EXPECTED, TERMS[term], SINGLE)
     x, y, p, g = v["intensity_m_s"], v["y_m_s"], v["p"], STANDARD_GRAVITY_M_S2
     r = v["kr"] / v["pga_g"]
     names = {

@@ -13,7 +13,7 @@ from PIL import Image
 
 from rbfrag.errors import InputError
 from rbfrag.motions.ground_motion import GroundMotion
-from rbfrag.plots.film import FRAMES_PER_S, film
+from rbfrag.plots.response import FRAMES_PER_S, film
 from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.respond import respond
 from rbfrag.solver.results import Response
@@ -72,13 +72,13 @@ def test_a_film_of_two_motions_shows_both(tmp_path: Path) -> None:
 def test_a_film_as_mp4(slump: Response, tmp_path: Path) -> None:
     path = film(slump, BLOCK, tmp_path / "slump.mp4", beta_deg=0.0, exaggerate=3.0, title="pulse")
     assert list(tmp_path.iterdir()) == [path]
-    asked = ("codec_name", "pix_fmt", "r_frame_rate", "nb_read_frames")
-    told = subprocess.run(
-        ["ffprobe", "-v", "error", "-count_frames", "-show_entries", f"stream={','.join(asked)}",
+    question = ("codec_name", "pix_fmt", "r_frame_rate", "nb_read_frames")
+    output = subprocess.run(
+        ["ffprobe", "-v", "error", "-count_frames", "-show_entries", f"stream={','.join(question)}",
          "-of", "default=noprint_wrappers=1", path],
         capture_output=True, text=True, check=True,
     ).stdout  # fmt: skip
-    about = dict(line.split("=") for line in told.splitlines())
+    about = dict(line.split("=") for line in output.splitlines())
     # what browsers and slides play
     assert (about["codec_name"], about["pix_fmt"]) == ("h264", "yuv420p")
     assert about["r_frame_rate"] == f"{FRAMES_PER_S}/1"

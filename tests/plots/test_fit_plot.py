@@ -21,8 +21,8 @@ def table():
     random = np.random.default_rng(6)
     pgv = np.exp(random.uniform(-4, 0.3, N))
     y = np.abs(0.72 * pgv + random.normal(size=N) * np.sqrt(1e-4 + 2e-3 * pgv))
-    found = np.arange(N) % 10 != 0
-    keep = np.where(found, 1.0, np.nan)
+    result = np.arange(N) % 10 != 0
+    keep = np.where(result, 1.0, np.nan)
     return CombinationTable(
         combination_id=np.arange(N),
         motion_id=np.arange(N),
@@ -30,7 +30,7 @@ def table():
         event_guessed=np.zeros(N, dtype=bool),
         polarity=np.full(N, "forward", dtype=object),
         p2=np.ones(N),
-        status=np.where(found, "found", "below_limit").astype(object),
+        status=np.where(result, "found", "below_limit").astype(object),
         search_limit=np.full(N, 0.01),
         kr_over_pga=keep * 0.5,
         upper=np.full(N, np.nan),
@@ -70,15 +70,15 @@ def model():
 @pytest.fixture
 def drawn(monkeypatch):
     """The figures that were made."""
-    made = []
+    drawn_figures = []
 
     def remember(*args):
-        made.append(new_figure(*args))
-        return made[-1]
+        drawn_figures.append(new_figure(*args))
+        return drawn_figures[-1]
 
     new_figure = fit_module.canvas.new_figure
     monkeypatch.setattr(fit_module.canvas, "new_figure", remember)
-    return made
+    return drawn_figures
 
 
 @pytest.mark.parametrize("suffix", ["png", "pdf", "svg"])
@@ -114,9 +114,9 @@ def test_the_variance_panel_shows_the_bins_of_the_fit(table, model, tmp_path, dr
     dots, missed, line = drawn[0].axes[3].lines
     x, variance = line.get_data()
     assert variance == pytest.approx(1e-4 + 2e-3 * x)
-    found = np.isfinite(table.y_m_s)
-    order = np.argsort(table.pgv_m_s[found])
-    x, y = table.pgv_m_s[found][order], table.y_m_s[found][order]
+    is_finite = np.isfinite(table.y_m_s)
+    order = np.argsort(table.pgv_m_s[is_finite])
+    x, y = table.pgv_m_s[is_finite][order], table.y_m_s[is_finite][order]
     # 360 points in 18 bins, and two parameters of the line
     residual = (y - 0.002 - 0.72 * x).reshape(18, 20)
     expected = (residual**2).mean(axis=1) * 360.0 / 358.0
@@ -186,8 +186,8 @@ def test_nothing_overlaps(table, model, tmp_path, drawn):
 def test_logarithmic_axes_show_every_block(table, model, tmp_path, drawn):
     plot_fit(table, model, tmp_path / "fit.png", log=True)
     axes, above, beside, variance = drawn[0].axes
-    for each in (axes, variance):
-        assert each.get_xscale() == each.get_yscale() == "log"
+    for item in (axes, variance):
+        assert item.get_xscale() == item.get_yscale() == "log"
     assert len(axes.collections[0].get_offsets()) == 360
     assert sum(patch.get_height() for patch in above.patches) == 360
     assert sum(patch.get_width() for patch in beside.patches) == 360

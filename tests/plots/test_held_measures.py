@@ -1,4 +1,4 @@
-"""What charts of more than one measure hold: said, rejected, and the answers of predict."""
+"""Fixed measures of charts of more than one: texts, rejections, and the answers of predict."""
 
 from __future__ import annotations
 
@@ -10,7 +10,6 @@ import pytest
 from rbfrag.db.model_file import ModelRow
 from rbfrag.errors import InputError
 from rbfrag.fragility.model import FragilityModel
-from rbfrag.plots import chart
 from rbfrag.plots.chart import plot_chart
 from rbfrag.plots.model_lines import failure_line, held_measures
 from rbfrag.question.question import predict
@@ -61,8 +60,7 @@ def test_what_is_not_given_is_the_middle_of_the_fitted_range() -> None:
     assert held_measures(ALONE).words == ""
 
 
-def test_a_size_gives_the_chart_an_axis_of_kr(tmp_path, caught) -> None:
-    figures = caught(chart)
+def test_a_size_gives_the_chart_an_axis_of_kr(tmp_path, figures) -> None:
     plot_chart(ALONE, tmp_path / "chart.png", held_measures(ALONE, p2=4.0))
     axes = figures[0].axes[0]
     (beside,) = axes.child_axes
@@ -79,12 +77,12 @@ def test_blocks_on_a_line_have_its_probability(model, pga) -> None:
     held = held_measures(model, p2=3.0, pga_g=None if model is OF_SIZE else pga)
     x = np.array([0.05, 0.2, 0.6])
     for pgv, y in zip(x, failure_line(model, x, 0.25, held), strict=True):
-        known = {"pgv_m_s": float(pgv)}
+        measures = {"pgv_m_s": float(pgv)}
         if model is not OF_SIZE:
-            known["pga_g"] = pgv / (0.08 * G) if pga is None else pga
+            measures["pga_g"] = pgv / (0.08 * G) if pga is None else pga
         if model is WITH_TM:
-            known["tm_s"] = 0.4
-        answer = predict(3.0, y * 3.0**0.5 / G, model=model, **known)
+            measures["tm_s"] = 0.4
+        answer = predict(3.0, y * 3.0**0.5 / G, model=model, **measures)
         assert answer.probability == pytest.approx(0.25, rel=1e-9)
 
 
@@ -95,7 +93,7 @@ def test_no_line_reaches_what_pga_cannot_lift() -> None:
 
 
 @pytest.mark.parametrize(
-    ("model", "given", "words"),
+    ("model", "held", "words"),
     [
         (OF_SIZE, {"pga_g": 0.3}, "pga_g = 0.3 has no effect"),
         (WITH_PGA, {"tm_s": 0.3}, "tm_s = 0.3 has no effect"),
@@ -109,17 +107,16 @@ def test_no_line_reaches_what_pga_cannot_lift() -> None:
         ),
     ],
 )
-def test_what_cannot_be_held_is_rejected(model, given, words) -> None:
+def test_what_cannot_be_held_is_rejected(model, held, words) -> None:
     with pytest.raises(InputError, match=words):
-        held_measures(model, **given)
+        held_measures(model, **held)
 
 
-def test_what_is_shaded_is_outside_the_fitted_range(tmp_path, caught) -> None:
-    figures = caught(chart)
+def test_what_is_shaded_is_outside_the_fitted_range(tmp_path, figures) -> None:
     held = held_measures(WITH_PGA, p2=3.0, pga_g=0.3)
     plot_chart(WITH_PGA, tmp_path / "chart.png", held)
     axes = figures[0].axes[0]
-    (shade,) = (each for each in axes.collections if each.get_paths())
+    (shade,) = (collection for collection in axes.collections if collection.get_paths())
     edges = np.concatenate([path.vertices for path in shade.get_paths()])[:, 0]
     # PGV/(PGA g) is fitted from 0.02 to 0.32 s
     for edge in (0.02 * 0.3 * G, 0.32 * 0.3 * G):

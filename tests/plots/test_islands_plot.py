@@ -12,8 +12,8 @@ from typer.testing import CliRunner
 from rbfrag.cli.main import app
 from rbfrag.errors import InputError
 from rbfrag.motions.ground_motion import GroundMotion
-from rbfrag.plots import islands
-from rbfrag.plots.islands import enlarged_range, plot_islands, rotations
+from rbfrag.plots import canvas
+from rbfrag.plots.critical_strength import enlarged_range, plot_islands, rotations
 from rbfrag.solver.critical_result import CriticalResult
 from rbfrag.solver.excitation import excitation
 from rbfrag.solver.search.critical import critical
@@ -44,19 +44,19 @@ def test_figure_shows_map_curve_and_values(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     motion, result = searched
-    kept = []
-    monkeypatch.setattr(islands.canvas, "save_figure", lambda figure, path: kept.append(figure))
+    figures = []
+    monkeypatch.setattr(canvas, "save_figure", lambda figure, path: figures.append(figure))
     plot_islands(motion, result, tmp_path / "islands.png", title="made up")
-    (figure,) = kept
+    (figure,) = figures
     FigureCanvasAgg(figure).draw()
-    whole, part = figure.axes
+    full, part = figure.axes
     assert "made up" in figure.get_suptitle()
     assert f"{result.lower:.6g}" in figure.get_suptitle()
     low, high = part.get_xlim()
     assert 0.01 <= low < high
-    words = {text.get_text() for text in whole.get_legend().get_texts()}
+    words = {text.get_text() for text in full.get_legend().get_texts()}
     assert words == {"all topple", "all stay", "peak rotation", "critical value", "$K_{up}$"}
-    at = [line.get_xdata()[0] for line in whole.lines if len(set(line.get_xdata())) == 1]
+    at = [line.get_xdata()[0] for line in full.lines if len(set(line.get_xdata())) == 1]
     assert result.lower in at
     assert result.k_up_over_pga in at
     # the bands are those of the map
@@ -76,23 +76,23 @@ def test_curve_is_broken_exactly_where_the_map_says_that_blocks_topple(
     searched: tuple[GroundMotion, CriticalResult],
 ) -> None:
     motion, result = searched
-    low, high, what = enlarged_range(result)
-    assert "safe island" in what
+    low, high, words = enlarged_range(result)
+    assert "safe island" in words
     ratios, theta_n = rotations(excitation(motion), result, low, high, logarithmic=False)
     assert np.all(np.diff(ratios) >= 0.0)
     at = np.minimum(np.searchsorted(result.intervals.k_hi, ratios), result.intervals.k_hi.size - 1)
-    said = np.array(result.intervals.outcome)[at]
-    assert np.all(np.isnan(theta_n[said == "topples"]))
-    assert np.all(np.isfinite(theta_n[said == "safe"]))
-    assert (said == "topples").any()
-    assert (said == "safe").any()
+    outcomes = np.array(result.intervals.outcome)[at]
+    assert np.all(np.isnan(theta_n[outcomes == "topples"]))
+    assert np.all(np.isfinite(theta_n[outcomes == "safe"]))
+    assert (outcomes == "topples").any()
+    assert (outcomes == "safe").any()
 
 
 def test_without_an_island_the_critical_value_is_enlarged() -> None:
     pulse = GroundMotion.from_nodes([0.0, 0.2, 0.4], [0.0, 0.5, 0.0])
     result = critical(pulse, p2=5.0, full_map=True)
-    low, high, what = enlarged_range(result)
-    assert what == "at the critical value"
+    low, high, words = enlarged_range(result)
+    assert words == "at the critical value"
     assert result.lower is not None
     assert low < result.lower < high
 

@@ -9,7 +9,7 @@ import pytest
 from matplotlib.text import Text
 
 import rbfrag
-from rbfrag.plots import kind_chart, plot
+from rbfrag.plots import chart, plot
 
 
 @pytest.mark.parametrize(
@@ -17,8 +17,7 @@ from rbfrag.plots import kind_chart, plot
     [("rocking-sa10", 9), ("rocking-pga_sa10", 8), ("sliding-pgv_pga_m", 9),
      ("sliding-pgv_pga_ia", 9), ("slumping-2deg-pgv_pga_m", 9), ("confined_toppling-pgv_pga", 9)],
 )  # fmt: skip
-def test_labels_and_caption(tmp_path: Path, caught, model: str, labels: int) -> None:  # type: ignore[no-untyped-def]
-    figures = caught(kind_chart)
+def test_labels_and_caption(tmp_path: Path, figures, model: str, labels: int) -> None:  # type: ignore[no-untyped-def]
     plot.chart(tmp_path / "chart.png", model=model, db=None)
     (figure,) = figures
     (axes,) = figure.axes
@@ -28,23 +27,23 @@ def test_labels_and_caption(tmp_path: Path, caught, model: str, labels: int) -> 
         p2 = float(np.sqrt(0.1 * 30.0))
         for text in texts:
             sa, kr = text.get_position()
-            found = rbfrag.predict(p2, kr, kind="rocking", sa10_g=sa, model=model).probability
-            assert 100.0 * found == pytest.approx(float(text.get_text()[:-2]), abs=1.0)
+            result = rbfrag.predict(p2, kr, kind="rocking", sa10_g=sa, model=model).probability
+            assert 100.0 * result == pytest.approx(float(text.get_text()[:-2]), abs=1.0)
     at = axes.transData.transform([text.get_position() for text in texts])
     points = 72.0 / figure.dpi * np.hypot(*np.diff(at, axis=0).T)
     assert points.min() > 8.0  # the height of the letters
     figure.draw_without_rendering()
     title: Text = axes.title
-    box, whole = title.get_window_extent(), figure.bbox
-    assert whole.x0 <= box.x0
-    assert box.x1 <= whole.x1
+    box, full = title.get_window_extent(), figure.bbox
+    assert full.x0 <= box.x0
+    assert box.x1 <= full.x1
 
 
-def test_middle_ratios_go_together(tmp_path: Path, caught) -> None:  # type: ignore[no-untyped-def]
+def test_middle_ratios_go_together() -> None:
     """PGA of a chart over SA(1) is that of the PGV of the chart's own middle ratio."""
     model = plot.find_model("rocking-pga_sa10", ["pga_g", "sa10_g"])
     domain = model.row.domain
-    pga, words = kind_chart._in_proportion("pga_g", "sa10_g", np.array([0.3]), model)
+    pga, words = chart._in_proportion("pga_g", "sa10_g", np.array([0.3]), model)
     seconds, velocity = (
         np.sqrt(np.prod(domain[name])) for name in ("pgv_over_pga_s", "v10_over_pgv")
     )

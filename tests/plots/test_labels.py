@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from rbfrag.plots.labels import as_written, settle_labels, write_near
+from rbfrag.plots.canvas import as_written, settle_labels, write_near
 
 
 @pytest.fixture

@@ -7,8 +7,7 @@ import pytest
 
 import rbfrag
 from rbfrag.errors import InputError
-from rbfrag.plots.blocks import mesh_block as module
-from rbfrag.plots.blocks.mesh_block import plot_mesh_block
+from rbfrag.plots.block import plot_mesh_block
 from tests.conftest import ROOT
 from tests.meshes import box, cut_ellipsoid, turned, write_obj
 
@@ -16,8 +15,7 @@ BOULDER = ROOT / "docs" / "examples" / "boulder.obj"
 
 
 @pytest.mark.parametrize("contact_mm", [7.0, 10.0])
-def test_what_is_drawn_is_the_block(contact_mm, tmp_path, caught, overlapping):
-    figures = caught(module)
+def test_what_is_drawn_is_the_block(contact_mm, tmp_path, figures, overlapping):
     block = rbfrag.block_from_mesh(BOULDER, contact_mm=contact_mm)
     plot_mesh_block(block, tmp_path / "a.png")
     (figure,) = figures
@@ -31,9 +29,9 @@ def test_what_is_drawn_is_the_block(contact_mm, tmp_path, caught, overlapping):
     }  # fmt: skip
     # the dashes of two lines never look alike
     assert len({(x.get_linestyle(), x.get_linewidth()) for x in polar.lines}) == len(drawn)
-    asked = drawn[f"contacts within {contact_mm:g} mm"].get_xydata()
+    question = drawn[f"contacts within {contact_mm:g} mm"].get_xydata()
     np.testing.assert_allclose(
-        asked[:, 1], block.hull.rocking(np.degrees(asked[:, 0])).kr_forward, rtol=1e-12
+        question[:, 1], block.hull.rocking(np.degrees(question[:, 0])).kr_forward, rtol=1e-12
     )
     (x, y) = drawn["weakest azimuth"].get_xydata()[0]
     assert (np.degrees(x), y) == pytest.approx((weakest.azimuth_deg, weakest.kr))
@@ -48,8 +46,7 @@ def test_what_is_drawn_is_the_block(contact_mm, tmp_path, caught, overlapping):
     assert overlapping(figure, [*texts, *legend, *numbers]) == []
 
 
-def test_axes_are_named_as_in_the_file_and_what_falls_is_left_out(tmp_path, caught):
-    figures = caught(module)
+def test_axes_are_named_as_in_the_file_and_what_falls_is_left_out(tmp_path, figures):
     vertices, faces = turned(box(0.4, 0.5, 1.1), "y", -1.0)
     path = write_obj(tmp_path / "a.obj", (np.roll(vertices, 1, axis=1), faces))
     plot_mesh_block(rbfrag.block_from_mesh(path, up="x"), tmp_path / "a.svg")

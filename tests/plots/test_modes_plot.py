@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from matplotlib.colors import to_hex
 
-from rbfrag.campaign.shake_rockmass import shake
+from rbfrag.campaign.rock_mass_answer import shake
 from rbfrag.errors import InputError
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.plots import modes as module
@@ -27,8 +27,7 @@ def names(figure):
 
 @pytest.mark.parametrize("back", [True, False])
 @pytest.mark.parametrize(("phi", "beta"), [(35.0, 0.0), (20.0, 10.0), (50.0, -15.0)])
-def test_the_regions_are_the_modes_of_the_solver(phi, beta, back, tmp_path, caught, overlapping):
-    figures = caught(module)
+def test_the_regions_are_the_modes_of_the_solver(phi, beta, back, tmp_path, figures, overlapping):
     plot_modes(tmp_path / "a.png", phi_deg=phi, beta_deg=beta, back_fracture=back)
     (figure,) = figures
     (image,) = images(figure)
@@ -41,10 +40,10 @@ def test_the_regions_are_the_modes_of_the_solver(phi, beta, back, tmp_path, caug
         if a1 >= a3:
             assert shown.mask[i3, i1]
             continue
-        found = stability(
+        judgement = stability(
             Block.from_angles(a1, a3, 1.0), beta_deg=beta, phi_deg=phi, back_fracture=back
         )
-        assert MODES[shown[i3, i1]] == found.mode
+        assert MODES[shown[i3, i1]] == judgement.mode
     texts = [t.get_text() for t in names(figure)]
     assert {"topple"} < set(texts)
     assert any(t.startswith("slide\n") and t.endswith(" g") for t in texts)
@@ -57,22 +56,20 @@ def test_the_regions_are_the_modes_of_the_solver(phi, beta, back, tmp_path, caug
     assert overlapping(figure, [*names(figure), *axes.get_legend().get_texts()]) == []
 
 
-def test_a_name_stands_in_its_region(tmp_path, caught):
-    figures = caught(module)
+def test_a_name_stands_in_its_region(tmp_path, figures):
     plot_modes(tmp_path / "a.png", phi_deg=35.0, beta_deg=20.0)
     for text in names(figures[0]):
         a1, a3 = text.get_position()
-        found = stability(Block.from_angles(a1, a3, 1.0), beta_deg=20.0, phi_deg=35.0)
-        assert text.get_text().split("\n")[0] == found.mode.replace("_", " ")
-        assert found.state == "stable"
+        judgement = stability(Block.from_angles(a1, a3, 1.0), beta_deg=20.0, phi_deg=35.0)
+        assert text.get_text().split("\n")[0] == judgement.mode.replace("_", " ")
+        assert judgement.state == "stable"
 
 
 @pytest.mark.parametrize("back", [True, False])
 @pytest.mark.parametrize(("phi", "beta"), [(35.0, 0.0), (40.0, 20.0), (50.0, -15.0)])
 def test_a_value_stands_on_its_contour_in_its_region(
-    phi, beta, back, tmp_path, caught, overlapping
+    phi, beta, back, tmp_path, figures, overlapping
 ):
-    figures = caught(module)
     plot_modes(tmp_path / "a.png", phi_deg=phi, beta_deg=beta, back_fracture=back)
     (figure,) = figures
     axes = figure.axes[0]
@@ -81,11 +78,13 @@ def test_a_value_stands_on_its_contour_in_its_region(
     by_colour = {colour: mode for mode, colour in MODE_COLOURS.items()}
     for text in values:
         a1, a3 = text.get_position()
-        found = stability(
+        judgement = stability(
             Block.from_angles(a1, a3, 1.0), beta_deg=beta, phi_deg=phi, back_fracture=back
         )
-        assert found.mode == by_colour[to_hex(text.get_color())]
-        assert found.yield_acceleration == pytest.approx(float(text.get_text()), rel=0.05, abs=0.01)
+        assert judgement.mode == by_colour[to_hex(text.get_color())]
+        assert judgement.yield_acceleration == pytest.approx(
+            float(text.get_text()), rel=0.05, abs=0.01
+        )
     assert overlapping(figure, [*names(figure), *values]) == []
     frame = axes.get_window_extent()
     for box in (text.get_window_extent() for text in values):
@@ -94,16 +93,14 @@ def test_a_value_stands_on_its_contour_in_its_region(
 
 
 @pytest.mark.parametrize("phi", [2.0, 5.0, 60.0, 85.0])
-def test_names_of_narrow_regions_do_not_cover_each_other(phi, tmp_path, caught, overlapping):
-    figures = caught(module)
+def test_names_of_narrow_regions_do_not_cover_each_other(phi, tmp_path, figures, overlapping):
     plot_modes(tmp_path / "a.png", phi_deg=phi)
     (figure,) = figures
     assert len(names(figure)) >= 3
     assert overlapping(figure, [*names(figure), figure._suptitle]) == []
 
 
-def test_a_few_blocks_are_points_and_many_a_histogram(tmp_path, caught):
-    figures = caught(module)
+def test_a_few_blocks_are_points_and_many_a_histogram(tmp_path, figures):
     a1 = np.random.default_rng(1).uniform(-30.0, 10.0, MOST_POINTS + 1)
     a3 = a1 + 25.0
     for count in (3, MOST_POINTS, MOST_POINTS + 1):
@@ -138,8 +135,7 @@ def test_rejections_leave_no_file(changes, words, tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_water_moves_the_regions_of_blocks_of_one_spacing(tmp_path, caught):
-    figures = caught(module)
+def test_water_moves_the_regions_of_blocks_of_one_spacing(tmp_path, figures):
     on = {"water_m": 1.0, "density_kg_m3": 2650.0}
     plot_modes(tmp_path / "a.png", phi_deg=35.0, beta_deg=5.0, s1_m=2.0, **on)
     (image,) = images(figures[0])
@@ -155,13 +151,13 @@ def test_water_moves_the_regions_of_blocks_of_one_spacing(tmp_path, caught):
         top_m = 2.0 * (np.cos(np.radians(5.0)) + block.cot_gamma * np.sin(np.radians(5.0)))
         held = {**on, "water_m": float(np.clip(top_m, 0.0, 1.0))}
         try:
-            found = stability(block, beta_deg=5.0, phi_deg=35.0, **held)
+            judgement = stability(block, beta_deg=5.0, phi_deg=35.0, **held)
         except InputError:
             afloat += 1
             assert shown.mask[at]
             continue
-        assert MODES[shown[at]] == found.mode
-        modes.add(found.mode)
+        assert MODES[shown[at]] == judgement.mode
+        modes.add(judgement.mode)
     assert len(modes) == 4
     assert afloat > 0
     assert "s1 2 m, water 1 m" in figures[0].get_suptitle()
@@ -169,8 +165,7 @@ def test_water_moves_the_regions_of_blocks_of_one_spacing(tmp_path, caught):
         plot_modes(tmp_path / "a.png", phi_deg=35.0, **on)
 
 
-def test_cells_are_blocks_of_their_angles_and_coloured_as_they_end(tmp_path, caught):
-    figures = caught(module)
+def test_cells_are_blocks_of_their_angles_and_coloured_as_they_end(tmp_path, figures):
     cells = module.chart_cells(phi_deg=35.0, beta_deg=15.0, s1_m=2.0)
     a1, a3 = np.meshgrid(module._CELLS, module._CELLS)
     assert np.allclose(cells.blocks.alpha1_deg, a1[a1 < a3], atol=1e-9)

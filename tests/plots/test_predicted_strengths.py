@@ -34,8 +34,8 @@ def test_models_of_the_record_and_of_free_exponents_are_drawn(tmp_path) -> None:
     source = drawn_outcomes("logistic", "pgv", (-2.0, 4.8), events=4, motions=1)
     record = model_of("xp", ("b0", "b_ln_xp_over_y", "b_ln_s"), (4.0, 3.0, 1.0), "record")
     names = ("ln_median", "slope", "ln_sigma", "m_minus_1")
-    free = model_of("pgv", names, (-0.4, 0.95, -1.2, -0.1), "lognormal")
-    for model in (record, free, WITH_TM):
+    exponents = model_of("pgv", names, (-0.4, 0.95, -1.2, -0.1), "lognormal")
+    for model in (record, exponents, WITH_TM):
         path = tmp_path / "fit.svg"
         plot_fit(source.table, model, path, log=True, xp_m_s=source.xp_m_s)
         assert "at 50 % probability of failure" in path.read_text(encoding="utf-8")

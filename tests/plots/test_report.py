@@ -15,8 +15,8 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 import rbfrag
 from rbfrag.fragility.model_selection import SHIPPED, data_name
 from rbfrag.hazards.curve import HazardCurve
-from rbfrag.plots.report import sheet
-from rbfrag.plots.report.contents import RateQuestion, contents_of, report_of
+from rbfrag.plots import report
+from rbfrag.plots.report_contents import RateQuestion, contents_of, report_of
 from rbfrag.results.numbers import percent, return_period
 from tests.cli.conftest import Rejects, Shell, rejects, shell
 
@@ -34,10 +34,10 @@ def words_of(path: Path, pages: int = 1) -> str:
     """Return the text of a report, its lines joined."""
     if path.suffix == ".pdf":
         pypdf = pytest.importorskip("pypdf")
-        found = pypdf.PdfReader(path).pages
-        assert len(found) == pages
-        assert [round(float(edge)) for edge in found[0].mediabox[2:]] == [595, 842]
-        text = " ".join(page.extract_text() for page in found)
+        result = pypdf.PdfReader(path).pages
+        assert len(result) == pages
+        assert [round(float(edge)) for edge in result[0].mediabox[2:]] == [595, 842]
+        text = " ".join(page.extract_text() for page in result)
     else:
         text = re.sub(r"<(style|svg).*?</\1>", " ", path.read_text("utf-8"), flags=re.DOTALL)
         text = re.sub(r"<sub>(.)</sub>", r"_\1", text)
@@ -49,14 +49,14 @@ def words_of(path: Path, pages: int = 1) -> str:
 def test_a_report_says_what_was_asked_and_answered(shell: Shell, suffix: str) -> None:
     Path("curve.csv").write_text(CURVE)
     out = f"rock.{suffix}"
-    told = shell.json(
+    answer = shell.json(
         "report", *SHAPE, "--hazard", "curve.csv", "--component", "rotd50", "--years", "100",
         "--title", "Rock above the mill", "--date", "1 May 2026", "--out", out,
     )  # fmt: skip
     predicted = shell.json("predict", *SHAPE, "--component", "rotd50")
     rate = shell.json("hazard", "curve.csv", *SHAPE[:-2], "--component", "rotd50", "--years", "100")
-    assert told["probability"] == predicted["probability"]
-    assert told["hazard"]["annual_rate"] == rate["annual_rate"]
+    assert answer["probability"] == predicted["probability"]
+    assert answer["hazard"]["annual_rate"] == rate["annual_rate"]
     printed = shell("predict", *SHAPE, "--component", "rotd50").stdout.splitlines()
     words = words_of(Path(out))
     annual = shell("hazard", "curve.csv", *SHAPE[:-2], "--component", "rotd50", "--years", "100")
@@ -64,11 +64,11 @@ def test_a_report_says_what_was_asked_and_answered(shell: Shell, suffix: str) ->
         assert " ".join(sentence.split()) in words
     for text in (
         "Rock above the mill", "1 May 2026", "2.4 m", "0.5 m", "3°", "35°", "0.6 m/s",
-        "P(failure in 100 years)", f"rbfrag {rbfrag.__version__}", told["model"], "curve.csv",
+        "P(failure in 100 years)", f"rbfrag {rbfrag.__version__}", answer["model"], "curve.csv",
         "100 earthquakes", "the built-in data set",
     ):  # fmt: skip
         assert text in words, text
-    for warning in told["warnings"][:-1]:
+    for warning in answer["warnings"][:-1]:
         assert warning[1:].split(":")[0] in words
 
 
@@ -85,16 +85,16 @@ def test_a_table_becomes_one_document(shell: Shell) -> None:
     rate = ("--hazard", "curve.csv", "--component", "rotd50")
     for suffix in ("pdf", "html"):
         out = f"blocks.{suffix}"
-        told = shell.json("report", "blocks.csv", "--pgv", "0.5", *rate, "--out", out)["blocks"]
-        one = shell.json("predict", *SHAPE, "--component", "rotd50")
-        assert [each["probability"] for each in told[:2]] == [1.0, one["probability"]]
-        assert len(told) == 4
+        answer = shell.json("report", "blocks.csv", "--pgv", "0.5", *rate, "--out", out)["blocks"]
+        prediction = shell.json("predict", *SHAPE, "--component", "rotd50")
+        assert [item["probability"] for item in answer[:2]] == [1.0, prediction["probability"]]
+        assert len(answer) == 4
         words = words_of(Path(out), pages=3)
         for text in (
             "Seismic fragility of rock blocks", "return period",
             "A1 toppling (rock face behind) 5.3 %",
             "A2 rocking (free-standing)", "B sliding", "unstable at rest", "'x' is not a number",
-            return_period(told[2]["hazard"]["annual_rate"]), "sliding-pgv",
+            return_period(answer[2]["hazard"]["annual_rate"]), "sliding-pgv",
         ):  # fmt: skip
             assert text in words, text
     page = Path("blocks.html").read_text("utf-8")
@@ -108,8 +108,8 @@ def test_a_table_becomes_one_document(shell: Shell) -> None:
 
 def test_a_table_that_makes_no_document(rejects: Rejects) -> None:
     Path("blocks.csv").write_text(TABLE)
-    asked = ("report", "blocks.csv", "--pgv", "0.5", "--out")
-    assert "require .pdf or .html" in rejects(*asked, "a.png")
+    question = ("report", "blocks.csv", "--pgv", "0.5", "--out")
+    assert "require .pdf or .html" in rejects(*question, "a.png")
     Path("blocks.csv").write_text("height [m],width [m],pgv [m/s]\n1,x,0.5\n")
     assert "'x' is not a number" in rejects("report", "blocks.csv", "--out", "a.pdf")
     assert not list(Path().glob("a.*"))
@@ -140,7 +140,7 @@ def test_a_page_needs_nothing_but_itself(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("asked", "words"),
+    ("question", "words"),
     [
         (("--p2", "3", "--pgv", "0.6"), "kr is missing"),
         (("--p2", "3", "--kr", "0.1"), "no intensity measure is given"),
@@ -151,8 +151,10 @@ def test_a_page_needs_nothing_but_itself(tmp_path: Path) -> None:
         (("--height", "1", "--width", "2", "--phi", "30", "--pgv", "0.6"), "give --displacement"),
     ],
 )
-def test_bad_questions_leave_no_file(rejects: Rejects, asked: tuple[str, ...], words: str) -> None:
-    assert words in rejects("report", *asked, "--out", "a.pdf")
+def test_bad_questions_leave_no_file(
+    rejects: Rejects, question: tuple[str, ...], words: str
+) -> None:
+    assert words in rejects("report", *question, "--out", "a.pdf")
     assert not list(Path().iterdir())
 
 
@@ -174,18 +176,18 @@ def test_reports_of_blocks_that_slide_and_slump(shell: Shell) -> None:
     slumps = ("--ks", "0.2", "--ps2", "3")
     pga = ("--pga", "0.5")
     for block, pictures, words in (
-        (slides, 3, ("failure mode sliding", "displacement limit 0.1 m")),
+        (slides, 4, ("failure mode sliding", "displacement limit 0.1 m")),
         # no curve of one measure is enough for a slump
         (slumps, 1, ("failure mode slumping", "p_s² 3 1/s²", "velocity, y = k_s g/p_s")),
     ):
         shaking, hazard = ("--pgv", "0.6", *(pga if block is slumps else component)), ()
         if block is slides:
             hazard = ("--hazard", "curve.csv")
-        told = shell.json("report", *block, *shaking, *hazard, "--out", "a.html")
-        assert told["probability"] == shell.json("predict", *block, *shaking)["probability"]
+        answer = shell.json("report", *block, *shaking, *hazard, "--out", "a.html")
+        assert answer["probability"] == shell.json("predict", *block, *shaking)["probability"]
         if hazard:
             rate = shell.json("hazard", "curve.csv", *block, *component)
-            assert told["hazard"]["annual_rate"] == rate["annual_rate"]
+            assert answer["hazard"]["annual_rate"] == rate["annual_rate"]
         page = Path("a.html").read_text("utf-8")
         assert page.count("<svg") == pictures
         assert "Design chart" not in page
@@ -201,10 +203,10 @@ def test_a_report_has_the_limit_state_and_the_level_that_are_asked_for(tmp_path:
     (tmp_path / "curve.csv").write_text(CURVE)
     rows = [{"p2": 3.0, "kr": kr, "pgv_m_s": 0.5, "level": 0.8} for kr in (0.1, 0.15)]
     meaning = {"component": "rotd50"}
-    found = report_of(rows, RateQuestion(tmp_path / "curve.csv", meaning=meaning))
+    result = report_of(rows, RateQuestion(tmp_path / "curve.csv", meaning=meaning))
     rates = rbfrag.hazard(tmp_path / "curve.csv", p2=3.0, kr=[0.1, 0.15], level=0.8, **meaning)
-    assert found.totals["expected_failures_per_year"] == rates.expected_failures_per_year
-    assert any("80 % confidence" in value for _, value in found.summary)
+    assert result.totals["expected_failures_per_year"] == rates.expected_failures_per_year
+    assert any("80 % confidence" in value for _, value in result.summary)
 
 
 def test_a_path_of_another_kind_is_rejected(rejects: Rejects) -> None:
@@ -212,7 +214,7 @@ def test_a_path_of_another_kind_is_rejected(rejects: Rejects) -> None:
 
 
 @pytest.mark.parametrize(
-    ("block", "given", "with_rate"),
+    ("block", "shaking", "with_rate"),
     [
         ({"block": ROCK}, {"pgv_m_s": 0.6, "pga_g": 0.5}, True),
         ({"block": ROCK, "kind": "rocking"}, {"pgv_m_s": 0.6}, False),
@@ -224,22 +226,22 @@ def test_a_path_of_another_kind_is_rejected(rejects: Rejects) -> None:
     ],
 )
 def test_nothing_on_the_sheet_covers_anything(
-    block: dict[str, Any], given: dict[str, float], with_rate: bool, tmp_path: Path
+    block: dict[str, Any], shaking: dict[str, float], with_rate: bool, tmp_path: Path
 ) -> None:
     (tmp_path / "curve.csv").write_text(CURVE)
     curve = tmp_path / "curve.csv" if with_rate else None
     rate = RateQuestion(curve, meaning={"component": "single"})
-    contents = contents_of({**block, **given}, rate)
-    with rc_context(sheet._RC):
-        figure = sheet.new_figure(8.27, 11.69)
-        sheet._draw(figure, contents, "A title", "today")
+    contents = contents_of({**block, **shaking}, rate)
+    with rc_context(report._RC):
+        figure = report.new_figure(8.27, 11.69)
+        report._draw(figure, contents, "A title", "today")
         canvas = FigureCanvasAgg(figure)
         canvas.draw()
         renderer = canvas.get_renderer()
         texts = [text for text in texts_of(figure) if text.get_text()]
         for axes in figure.axes:
-            texts += [one for one in (axes.xaxis.label, axes.yaxis.label) if one.get_text()]
-        boxes = [each.get_window_extent(renderer) for each in (*figure.axes, *texts)]
+            texts += [item for item in (axes.xaxis.label, axes.yaxis.label) if item.get_text()]
+        boxes = [item.get_window_extent(renderer) for item in (*figure.axes, *texts)]
     for i, box in enumerate(boxes):
         assert figure.bbox.contains(*box.min)
         assert figure.bbox.contains(*box.max)
@@ -250,8 +252,8 @@ def test_nothing_on_the_sheet_covers_anything(
 def test_a_long_title_has_lines_and_its_dollars(tmp_path: Path) -> None:
     contents = contents_of({"block": ROCK, "pgv_m_s": 0.6})
     title = "Blocks above the road, at costs of $5 and $6 a day, " * 4
-    figure = sheet.new_figure(8.27, 11.69)
-    sheet._draw(figure, contents, title, "1 May 2026")
+    figure = report.new_figure(8.27, 11.69)
+    report._draw(figure, contents, title, "1 May 2026")
     canvas = FigureCanvasAgg(figure)
     canvas.draw()
     texts = [text for text in texts_of(figure) if text.get_text()]
@@ -266,10 +268,30 @@ def test_a_long_title_has_lines_and_its_dollars(tmp_path: Path) -> None:
 
 
 def texts_of(part):
-    return [*part.texts, *(text for each in part.subfigs for text in texts_of(each))]
+    return [*part.texts, *(text for subfig in part.subfigs for text in texts_of(subfig))]
 
 
 def test_the_password_of_a_database_is_not_printed() -> None:
     assert data_name("postgresql://me:secret@host/rocks?options=-c") == "rocks"
     assert data_name("/home/me/rocks.db") == "rocks.db"
     assert data_name(SHIPPED) == SHIPPED
+
+
+def test_the_most_critical_blocks_have_their_sensitivity(tmp_path: Path) -> None:
+    curve = HazardCurve("pgv_m_s", np.array([0.1, 0.4, 1.6]), np.array([3e-2, 2.2e-3, 5e-5]))
+    rows = [
+        {"block_id": f"b{i}", "height_m": 2.0, "width_m": 0.3 + 0.02 * i, "phi_deg": 40.0,
+         "pgv_m_s": 0.9}
+        for i in range(8)
+    ]  # fmt: skip
+    out = tmp_path / "rocks.html"
+    contents = report.write_report(out, rows, RateQuestion(curve))
+    assert contents.most_critical == [f"b{i}" for i in range(6)]
+    text = out.read_text("utf-8")
+    title = "<figcaption>P at usual errors of measurement</figcaption>"
+    assert text.count(title) == 6
+    assert text.count("<figcaption>Probability of failure of this block</figcaption>") == 2
+    rbfrag.report(out, curve=curve, height_m=2.0, width_m=0.4, phi_deg=40.0, pgv_m_s=0.6)
+    alone = out.read_text("utf-8")
+    assert alone.count(title) == 1
+    assert alone.count("<figcaption>") == 5

@@ -11,11 +11,7 @@ from rbfrag.errors import InputError
 from rbfrag.hazards.curve import hazard_curve
 from rbfrag.hazards.hazard_rates import hazard
 from rbfrag.hazards.loss_answer import Exceedance
-from rbfrag.plots import hazard as hazard_module
-from rbfrag.plots import losses as losses_module
-from rbfrag.plots import shakemap as map_module
-from rbfrag.plots.hazard import plot_contribution
-from rbfrag.plots.losses import plot_losses
+from rbfrag.plots.hazard import plot_contribution, plot_losses
 from rbfrag.plots.shakemap import plot_shakemap
 
 LONG = "a name of costs of $5 and $6 that goes on " * 4
@@ -43,8 +39,7 @@ def reached(values, years=1000.0):
 
 
 @pytest.mark.parametrize("values", [(1,), (1, 2, 3), (35, 60, 80), (1, 40, 4e4), (1e3, 1e8, 3e9)])
-def test_every_axis_of_losses_has_numbers_and_a_unit(values, tmp_path, caught):
-    figures = caught(losses_module)
+def test_every_axis_of_losses_has_numbers_and_a_unit(values, tmp_path, figures):
     plot_losses(reached(values), tmp_path / "a.png")
     (figure,) = figures
     for axes in figure.axes:
@@ -69,33 +64,31 @@ def test_losses_without_a_curve_are_rejected(tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_shares_of_a_rate_are_those_of_the_shell(tmp_path, caught):
-    figures = caught(hazard_module)
+def test_shares_of_a_rate_are_those_of_the_shell(tmp_path, figures):
     x = np.geomspace(0.01, 3.0, 60)
     curve = hazard_curve("pgv_m_s", x, 1e-3 * np.exp(-x / 0.02))
     answer = hazard(curve, 3.0, 0.01, component="single")
     plot_contribution(curve, answer, tmp_path / "a.png")
     heights = [bar.get_height() for bar in figures[0].axes[1].patches]
-    whole = 100.0 * answer.contribution[0].sum() / answer.annual_rate[0]
-    assert sum(heights) == pytest.approx(whole)
-    assert 50.0 < whole <= 100.0
+    full = 100.0 * answer.contribution[0].sum() / answer.annual_rate[0]
+    assert sum(heights) == pytest.approx(full)
+    assert 50.0 < full <= 100.0
     assert figures[0].axes[1].get_ylabel().startswith("fraction of the rate [%]")
 
 
-def test_names_of_sites_and_events_are_letters_and_stay_on_the_sheet(tmp_path, caught, overlapping):
-    figures = caught(hazard_module)
+def test_names_of_sites_and_events_are_letters_and_stay_on_the_sheet(
+    tmp_path, figures, overlapping
+):
     x = np.geomspace(0.01, 10.0, 20)
     curve = hazard_curve("pgv_m_s", x, 1e-4 * x**-2.0, site=LONG)
     answer = hazard(curve, 3.0, 0.1, component="single")
     plot_contribution(curve, answer, tmp_path / "a.png")
-    maps = caught(map_module)
-    places = np.linspace(10.0, 10.1, 5)
-    plot_shakemap(places, places, np.geomspace(1e-4, 1, 5), tmp_path / "b.png", title=LONG)
-    rate = figures[0]
+    degrees = np.linspace(10.0, 10.1, 5)
+    plot_shakemap(degrees, degrees, np.geomspace(1e-4, 1, 5), tmp_path / "b.png", title=LONG)
+    rate, sheet = figures
     assert "\\$5" in rate.get_suptitle()
     assert answer.headline() in rate.get_suptitle()
     assert overlapping(rate, [rate._suptitle, *(axes.title for axes in rate.axes)]) == []
-    (sheet,) = maps
     title = sheet.axes[0].title
     assert "\\$5" in title.get_text()
     assert overlapping(sheet, [title]) == []

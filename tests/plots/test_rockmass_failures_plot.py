@@ -7,9 +7,8 @@ import pytest
 
 from rbfrag.errors import InputError
 from rbfrag.motions.ground_motion import GroundMotion
-from rbfrag.plots import rockmass as module
 from rbfrag.plots.rockmass import plot_failures
-from rbfrag.rockmasses.failures import failures
+from rbfrag.rockmasses.counts import failures
 from rbfrag.rockmasses.joint_sets import RockMass
 from rbfrag.rockmasses.shaking import plan_shaking, run_blocks
 from tests.synthetic import shaking
@@ -33,18 +32,17 @@ def shaken(scales):
     return plan.gathered(map(run_blocks, plan.work()))
 
 
-def test_curves_and_bars_of_four_modes(tmp_path, caught, overlapping):
-    figures = caught(module)
-    found = shaken([0.5, 0.9, 1.6])
-    plot_failures(found, tmp_path / "a.png")
+def test_curves_and_bars_of_four_modes(tmp_path, figures, overlapping):
+    result = shaken([0.5, 0.9, 1.6])
+    plot_failures(result, tmp_path / "a.png")
     (figure,) = figures
     curves, bars, above = figure.axes
-    counted = failures(found)
+    counted = failures(result)
     lines = {line.get_label(): line for line in curves.lines}
     assert set(lines) == {"all blocks", "slide", "topple", "slump", "confined topple"}
     for mode, name in (("slide", "slide"), ("confined_topple", "confined topple")):
         assert lines[name].get_ydata().tolist() == [
-            100.0 * each.modes[mode].of_all.value for each in counted
+            100.0 * item.modes[mode].of_all.value for item in counted
         ]
     assert lines["all blocks"].get_xdata().tolist() == [0.5, 0.9, 1.6]
     assert above.get_xlim()[1] / curves.get_xlim()[1] == pytest.approx(0.6)
@@ -60,8 +58,7 @@ def test_curves_and_bars_of_four_modes(tmp_path, caught, overlapping):
     assert overlapping(figure, texts) == []
 
 
-def test_one_scale_has_bars_alone(tmp_path, caught):
-    figures = caught(module)
+def test_one_scale_has_bars_alone(tmp_path, figures):
     plot_failures(shaken([1.0]), tmp_path / "a.svg")
     assert len(figures[0].axes) == 1
 

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from rbfrag.errors import InputError
-from rbfrag.plots import rockmass as module
 from rbfrag.plots.rockmass import plot_rockmass
 from rbfrag.rockmasses.counts import crossings, mode_counts
 from rbfrag.rockmasses.joint_sets import RockMass
@@ -17,7 +16,7 @@ def normal(mean, sd):
 
 
 @pytest.fixture(scope="module")
-def made():
+def realisations():
     return RockMass.of(
         {
             "base.dip_deg": normal(20.0, 5.0),
@@ -29,19 +28,18 @@ def made():
     ).realise(5_000, 1)
 
 
-def test_curves_shares_and_crossing(made, tmp_path, caught, overlapping):
-    figures = caught(module)
-    plot_rockmass(made, tmp_path / "a.png")
+def test_curves_shares_and_crossing(realisations, tmp_path, figures, overlapping):
+    plot_rockmass(realisations, tmp_path / "a.png")
     (figure,) = figures
     axes, bars = figure.axes
     curves = {line.get_label(): line for line in axes.lines if len(line.get_xdata()) > 2}
     assert set(curves) == {"slide", "slump"}
-    found = made.stability
+    result = realisations.stability
     for mode, line in curves.items():
-        k = found.yield_acceleration[made.is_block & (found.mode == mode)]
+        k = result.yield_acceleration[realisations.is_block & (result.mode == mode)]
         for pga, count in zip(line.get_xdata()[::60], line.get_ydata()[::60], strict=True):
             assert count == np.sum(np.maximum(k, 0.0) <= pga)
-    (crossing,) = crossings(made)
+    (crossing,) = crossings(realisations)
     (mark,) = [line for line in axes.lines if line.get_marker() == "o"]
     assert (mark.get_xdata()[0], mark.get_ydata()[0]) == (crossing.pga_g, crossing.count)
     lines = list(curves.values())
@@ -49,15 +47,14 @@ def test_curves_shares_and_crossing(made, tmp_path, caught, overlapping):
     assert meet == pytest.approx([crossing.count] * 2, rel=0.02)
     assert f"{crossing.pga_g:.3f}" in axes.texts[0].get_text()
     heights = [bar.get_height() for bar in bars.patches]
-    counts = mode_counts(made)
+    counts = mode_counts(realisations)
     assert heights == [100.0 * counts[m].share for m in ("slide", "slump")]
     assert "[g]" in axes.get_xlabel()
     assert "[%]" in bars.get_ylabel()
     assert overlapping(figure, [*axes.texts, *bars.texts, *axes.get_legend().get_texts()]) == []
 
 
-def test_four_modes_fit_side_by_side(tmp_path, caught, overlapping):
-    figures = caught(module)
+def test_four_modes_fit_side_by_side(tmp_path, figures, overlapping):
     uniform = {"distribution": "uniform"}
     mass = RockMass.of(
         {
@@ -74,6 +71,6 @@ def test_four_modes_fit_side_by_side(tmp_path, caught, overlapping):
     assert overlapping(figures[0], [*bars.texts, *bars.get_xticklabels()]) == []
 
 
-def test_a_path_that_cannot_be_written_is_rejected(made, tmp_path):
+def test_a_path_that_cannot_be_written_is_rejected(realisations, tmp_path):
     with pytest.raises(InputError, match="plot file"):
-        plot_rockmass(made, tmp_path / "none" / "a.png")
+        plot_rockmass(realisations, tmp_path / "none" / "a.png")

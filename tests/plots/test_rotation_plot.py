@@ -2,25 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
-from types import ModuleType
 
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
 from rbfrag.errors import InputError
-from rbfrag.plots import rotation as module
-from rbfrag.plots.rotation import plot_rotation, yield_lines
+from rbfrag.plots.modes import plot_rotation, yield_lines
 from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.stability.rotated_yield import kct_after_rotation, ks_after_rotation
 
-Caught = Callable[[ModuleType], list[Figure]]
 
-
-def test_lines_are_the_yields(tmp_path: Path, caught: Caught) -> None:
-    figures = caught(module)
+def test_lines_are_the_yields(tmp_path: Path, figures: list[Figure]) -> None:
     for angles, function in (
         ((45.0, 65.0), ks_after_rotation),
         ((-60.0, 20.0), kct_after_rotation),

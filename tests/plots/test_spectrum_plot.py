@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -14,11 +13,8 @@ from matplotlib.figure import Figure
 from rbfrag.errors import InputError
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.toppling_spectrum import toppling_spectrum
-from rbfrag.plots import spectrum as module
 from rbfrag.plots.spectrum import block_size_m, plot_spectrum
 from tests.synthetic import shaking
-
-Caught = Callable[[ModuleType], list[Figure]]
 
 MOTIONS = [
     GroundMotion(factor * shaking(seed), 0.02, event=f"EVENT {seed}", station="SOMEWHERE FAR")
@@ -32,8 +28,7 @@ def test_is_written(tmp_path: Path, suffix: str) -> None:
     assert path.stat().st_size > 2000
 
 
-def test_curves_are_the_spectra_and_pgv(tmp_path: Path, caught: Caught) -> None:
-    figures = caught(module)
+def test_curves_are_the_spectra_and_pgv(tmp_path: Path, figures: list[Figure]) -> None:
     plot_spectrum(MOTIONS[:1], tmp_path / "s.png", polarities=("reverse",), p2=(1.0, 30.0))
     axes = figures[0].axes[0]
     curve, pgv = axes.lines[:2]
@@ -50,9 +45,8 @@ def test_size_axis_is_that_of_a_rectangle() -> None:
 
 
 def test_nothing_covers_anything(
-    tmp_path: Path, caught: Caught, overlapping: Callable[[Figure, list[Any]], list[Any]]
+    tmp_path: Path, figures: list[Figure], overlapping: Callable[[Figure, list[Any]], list[Any]]
 ) -> None:
-    figures = caught(module)
     plot_spectrum(MOTIONS, tmp_path / "s.png")
     figure = figures[0]
     axes = figure.axes[0]

@@ -29,14 +29,14 @@ def test_nothing_moves_less() -> None:
 
     rng = np.random.default_rng(1)
     for _ in range(20):
-        places = np.sort(rng.uniform(0.0, 1.0, 6))
-        found = np.array(spread_out(places.tolist(), 0.2))
-        assert np.diff(found).min() > 0.2 - 1e-12
+        positions = np.sort(rng.uniform(0.0, 1.0, 6))
+        result = np.array(spread_out(positions.tolist(), 0.2))
+        assert np.diff(result).min() > 0.2 - 1e-12
         least = minimize(
-            lambda x, places=places: ((x - places) ** 2).sum(),
-            found,
+            lambda x, positions=positions: ((x - positions) ** 2).sum(),
+            result,
             constraints={"type": "ineq", "fun": lambda x: np.diff(x) - 0.2},
             method="SLSQP",
             options={"ftol": 1e-12},
         )
-        assert ((found - places) ** 2).sum() <= least.fun + 1e-8
+        assert ((result - positions) ** 2).sum() <= least.fun + 1e-8

@@ -9,8 +9,7 @@ import pytest
 
 from rbfrag.hazards.curve import hazard_curve
 from rbfrag.hazards.survival import survival
-from rbfrag.plots import survival as module
-from rbfrag.plots.survival import plot_survival
+from rbfrag.plots.hazard import plot_survival
 
 
 def branches(n, name="rlz-{:03d}"):
@@ -29,14 +28,13 @@ def answer(curves):
 
 
 @pytest.mark.parametrize("n", [1, 3, 10])
-def test_a_few_branches_are_named(n, tmp_path, caught, overlapping):
-    figures = caught(module)
+def test_a_few_branches_are_named(n, tmp_path, figures, overlapping):
     curves = branches(n)
     plot_survival(curves, answer(curves), tmp_path / "a.png")
     (figure,) = figures
     hazards, standing, weights = figure.axes
     named = [line.get_label() for line in hazards.lines]
-    assert named == [one.source for one in curves]
+    assert named == [curve.source for curve in curves]
     assert [tick.get_text() for tick in weights.get_yticklabels()] == named
     (legend,) = figure.legends
     assert set(named) <= {text.get_text() for text in legend.get_texts()}
@@ -45,12 +43,11 @@ def test_a_few_branches_are_named(n, tmp_path, caught, overlapping):
     assert overlapping(figure, texts) == []
 
 
-def test_the_title_says_p_as_the_shell_does(tmp_path, caught):
-    figures = caught(module)
+def test_the_title_says_p_as_the_shell_does(tmp_path, figures):
     curves = branches(1)
-    found = answer(curves)
-    plot_survival(curves, found, tmp_path / "a.png")
-    assert figures[0].get_suptitle() == found.headline()
+    result = answer(curves)
+    plot_survival(curves, result, tmp_path / "a.png")
+    assert figures[0].get_suptitle() == result.headline()
 
 
 def test_large_factors_have_no_exponent():
@@ -59,12 +56,11 @@ def test_large_factors_have_no_exponent():
 
 
 def test_many_branches_are_drawn_alike_and_those_of_most_weight_listed(
-    tmp_path, caught, overlapping
+    tmp_path, figures, overlapping
 ):
-    figures = caught(module)
     curves = branches(60, "a long name of a branch of a logic tree, number {:02d}")
-    found = answer(curves)
-    plot_survival(curves, found, tmp_path / "a.png")
+    result = answer(curves)
+    plot_survival(curves, result, tmp_path / "a.png")
     (figure,) = figures
     hazards, _, weights = figure.axes
     assert len(hazards.lines) == 60
@@ -73,6 +69,6 @@ def test_many_branches_are_drawn_alike_and_those_of_most_weight_listed(
     assert "each of 60 curves" in [text.get_text() for text in legend.get_texts()]
     assert weights.get_title() == "10 of 60 branches"
     after = [bar.get_width() for bar in weights.patches[10:]]
-    heaviest = sorted((one.weight_given_standing for one in found.branches), reverse=True)
+    heaviest = sorted((branch.weight_given_standing for branch in result.branches), reverse=True)
     assert after == pytest.approx([100.0 * weight for weight in heaviest[:10]])
     assert overlapping(figure, [*legend.get_texts(), *weights.get_yticklabels()]) == []

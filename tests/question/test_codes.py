@@ -17,7 +17,8 @@ from rbfrag.db.location import REFERENCE
 from rbfrag.errors import InputError
 from rbfrag.exchange.table_answers import predict_table
 from rbfrag.question.document import answer_block
-from rbfrag.question.question import ask, with_drained_bound
+from rbfrag.question.drained_bound import with_drained_bound
+from rbfrag.question.question import ask
 from rbfrag.results.diagnostic import diagnostics
 from rbfrag.vocabulary.quantities import column_of
 
@@ -62,6 +63,9 @@ QUESTIONS: dict[str, dict[str, Any]] = {
                                       "phi_deg": 30.0, "water_m": 0.2} | BOTH,
     "cohesion": SLAB | PGV | {"cohesion_pa": 5000.0},
     "scenario": SLAB | SCENARIO,
+    "scenario of one model": SLAB | SCENARIO | {"gmm_sigma": 0.0},
+    "errors of measurement": SLAB | PGV | {"beta_deg": 9.0, "beta_sigma_deg": 2.0},
+    "mostly unstable": SLAB | PGV | {"beta_deg": 12.0, "beta_sigma_deg": 2.0},
     "component": SLAB | PGV | {"component": "rotd50"},
     "PGA alone": NUMBERS | {"pga_g": 0.7},
     "unused measure": SLAB | PGV | {"pgd_m": 0.1},
@@ -119,9 +123,10 @@ def test_codes_are_those_of_an_array_and_a_row(name: str) -> None:
 
 
 def test_the_questions_cover_the_warnings() -> None:
-    found = {code for q in QUESTIONS.values() for code in codes(rbfrag.predict(**q).warnings)}
-    assert found >= {
-        "after_first_slip", "back_friction_neglected", "by_mechanics", "check_unit",
+    result = {code for q in QUESTIONS.values() for code in codes(rbfrag.predict(**q).warnings)}
+    assert result >= {
+        "after_first_slip", "back_friction_neglected", "by_mechanics", "check_stability",
+        "check_unit", "excluded_draws",
         "cohesion_without_effect", "cross_tilt_neglected", "density_assumed", "drained",
         "extrapolation", "friction_not_given", "heel_tips", "leans_on_back_plane",
         "model_choice", "no_drained_bound", "no_shaking", "not_backed", "not_symmetric",
@@ -131,11 +136,11 @@ def test_the_questions_cover_the_warnings() -> None:
 
 
 def test_rows_are_those_a_warning_is_about() -> None:
-    found = rbfrag.predict(
+    prediction = rbfrag.predict(
         [3.0, 60.0, 3.0, 3.0, 3.0, 60.0], [0.1, 0.1, 0.9, 0.1, -0.1, 0.1],
         pgv_m_s=[0.6, 0.6, 0.1, 0.0, 0.6, 0.6],
     )  # fmt: skip
-    rows = {warning.code: [*warning.rows] for warning in diagnostics(found.warnings)}
+    rows = {warning.code: [*warning.rows] for warning in diagnostics(prediction.warnings)}
     assert rows == {
         "extrapolation": [1, 5], "by_mechanics": [2], "no_shaking": [3], "unstable_at_rest": [4],
         "single_component": [],
@@ -205,11 +210,11 @@ def test_codes_are_those_of_an_array(block: dict[str, Any], shaking: dict[str, A
     assert codes(rbfrag.predict(**several, db=REFERENCE).warnings) == expected
     kind = question.get("kind")
     row = {n: v for n, v in arrays(question).items() if n not in ("kind", "component")}
-    found = with_drained_bound(
+    result = with_drained_bound(
         lambda rows: ask(
             rows, kind=None if kind is None else [kind], rows=True, db=REFERENCE,
             component=question.get("component"),
         ),
         row,
     )  # fmt: skip
-    assert codes(found.warnings) == expected
+    assert codes(result.warnings) == expected

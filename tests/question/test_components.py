@@ -23,12 +23,7 @@ from rbfrag.fragility.prediction import Prediction
 from rbfrag.hazards.curve import hazard_curve
 from rbfrag.hazards.curve_file import hazard_curves_in
 from rbfrag.hazards.shaking import HazardLevel
-from rbfrag.question.components import (
-    COMPONENT_SIGMA,
-    COMPONENTS,
-    SINGLE_ASSUMED,
-    component_named,
-)
+from rbfrag.question.components import COMPONENT_SIGMA, COMPONENTS, SINGLE_ASSUMED, component_named
 from rbfrag.question.document import answer_numbers
 from rbfrag.results.diagnostic import Diagnostic
 from rbfrag.results.numbers import percent
@@ -69,15 +64,15 @@ def dense(question: dict[str, Any], name: str) -> float:
 
 
 def answer(question: dict[str, Any], **about: Any) -> Prediction:
-    found = rbfrag.predict(**question, db=REFERENCE, **about)
-    assert isinstance(found, Prediction)
-    return found
+    prediction = rbfrag.predict(**question, db=REFERENCE, **about)
+    assert isinstance(prediction, Prediction)
+    return prediction
 
 
 @pytest.fixture(scope="module")
 def client() -> Any:
-    with TestClient(make_app(ServiceSettings(db=str(REFERENCE)))) as found:
-        yield found
+    with TestClient(make_app(ServiceSettings(db=str(REFERENCE)))) as result:
+        yield result
 
 
 def test_the_ratios_are_those_of_the_papers() -> None:
@@ -101,30 +96,30 @@ def test_every_interface_equals_a_dense_integration(
     question: dict[str, Any], name: str, client: TestClient, tmp_path: Path
 ) -> None:
     expected = dense(question, name)
-    found = answer(question, component=name)
-    assert found.probability == pytest.approx(expected, abs=1e-3)
+    reply = answer(question, component=name)
+    assert reply.probability == pytest.approx(expected, abs=1e-3)
     document = answer_numbers(
         {n: v for n, v in question.items() if n != "kind"}, kind=question.get("kind"),
         component=name, db=REFERENCE,
     )  # fmt: skip
-    assert document.probability == found.probability
+    assert document.probability == reply.probability
     numbers = {n: [v, v] for n, v in question.items() if n != "kind"}
     many = rbfrag.predict(
         **numbers, kind=question.get("kind"), component=["single", name], db=REFERENCE
     )
-    assert many.probability[1] == pytest.approx(found.probability, rel=1e-6)
+    assert many.probability[1] == pytest.approx(reply.probability, rel=1e-6)
     assert many.probability[0] == pytest.approx(answer(question).probability, rel=1e-6)
     options = [
         part for n, value in {**question, "component": name}.items()
         for part in (option_of(n), str(value))
     ]  # fmt: skip
     printed = CliRunner().invoke(app, ["predict", *options, "--db", str(REFERENCE), "--json"])
-    assert json.loads(printed.stdout)["probability"] == found.probability
+    assert json.loads(printed.stdout)["probability"] == reply.probability
     sent = {parameter_of(n): value for n, value in {**question, "component": name}.items()}
     got = client.get("/v1/predict", params=sent).json()
-    assert got["probability"] == found.probability
+    assert got["probability"] == reply.probability
     of_all = client.post("/v1/predict", json=sent).json()
-    assert of_all["probability"] == found.probability
+    assert of_all["probability"] == reply.probability
     listed = {**sent, "component": [None, name]}
     posted = client.post("/v1/predict", json=listed).json()
     assert posted["probability"] == pytest.approx(many.probability.tolist(), rel=1e-9)
@@ -148,8 +143,8 @@ def test_scatter_of_block_and_shaking_adds_to_that_of_the_component() -> None:
     assert answer(question).probability == pytest.approx(answer(same).probability, rel=1e-9)
     question = {**TOPPLING, "pgv_m_s": 0.6, "pgv_sigma": 0.5, "amplification_sigma": 0.2}
     same = {**TOPPLING, "pgv_m_s": 0.6, "pgv_sigma": np.hypot(0.5, np.hypot(0.2, COMPONENT_SIGMA))}
-    found = answer(question, component="rotd50").probability
-    assert found == pytest.approx(answer(same).probability, rel=1e-9)
+    document = answer(question, component="rotd50").probability
+    assert document == pytest.approx(answer(same).probability, rel=1e-9)
     with pytest.raises(InputError, match=r"amplification_sigma = -0\.2"):
         answer({**question, "amplification_sigma": -0.2}, component="rotd50")
     doubled = answer({**TOPPLING, "pgv_m_s": 0.3, "amplification": 2.0}, component="rotd50")
@@ -158,11 +153,11 @@ def test_scatter_of_block_and_shaking_adds_to_that_of_the_component() -> None:
 
 
 def test_sites_of_an_earthquake_do_not_share_the_direction() -> None:
-    found = answer({**TOPPLING, "pgv_m_s": 0.6}, component="rotd50", sites=5)
+    document = answer({**TOPPLING, "pgv_m_s": 0.6}, component="rotd50", sites=5)
     single = answer({**TOPPLING, "pgv_m_s": 0.6}, sites=5)
-    assert found.event_low is not None
+    assert document.event_low is not None
     assert single.event_low is not None
-    assert found.event_low == pytest.approx(single.event_low, abs=0.1)
+    assert document.event_low == pytest.approx(single.event_low, abs=0.1)
 
 
 @pytest.mark.parametrize(
@@ -184,9 +179,9 @@ def test_what_does_not_go_with_a_component(
     if "motion" in question:
         motion = rbfrag.GroundMotion(np.sin(np.arange(500) * 0.05), 0.01)
         question["motion"] = motion
-        given = {"p2": 3.0, "kr": 0.1}
+        inputs = {"p2": 3.0, "kr": 0.1}
         with pytest.raises(InputError, match="component"):
-            answer_numbers(given, motion=motion, component="rotd50", db=REFERENCE)
+            answer_numbers(inputs, motion=motion, component="rotd50", db=REFERENCE)
     with pytest.raises(InputError, match=expected) as error:
         rbfrag.predict(**question, db=REFERENCE)
     assert error.value.fields == ("component",)
@@ -256,9 +251,9 @@ def test_a_curve_file_that_names_its_component_is_believed(text: str) -> None:
 def test_a_spectral_curve_is_converted_at_its_own_period() -> None:
     curve = hazard_curve("sa_g", [0.1, 1.0], [1e-2, 1e-4], period_s=0.5)
     about = {"convert": "bommer_alarcon_2006", "convert_sigma": 0.3}
-    found = HazardLevel.of(curve, component="rotd100", **about)  # type: ignore[arg-type]
+    result = HazardLevel.of(curve, component="rotd100", **about)  # type: ignore[arg-type]
     single = HazardLevel.of(curve, component="single", **about)  # type: ignore[arg-type]
-    assert found.median == pytest.approx(single.median / 1.23)
+    assert result.median == pytest.approx(single.median / 1.23)
 
 
 def test_the_nearest_name_is_offered() -> None:

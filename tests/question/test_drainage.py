@@ -63,8 +63,8 @@ def test_both_bounds_stand_in_one_answer(
     assert bound_of(wet) == {name: getattr(dry, name) for name in BOUND}
     assert wet.drained is not None
     assert wet.drained[strength[0]] == pytest.approx(strength[1], abs=5e-4)
-    stated = rbfrag.predict(**block, water_m=water_m, drainage="drained")
-    assert stated.probability == dry.probability
+    value = rbfrag.predict(**block, water_m=water_m, drainage="drained")
+    assert value.probability == dry.probability
     assert dry.drained is None
     assert rbfrag.predict(**block, water_m=0.0).drained is None
 
@@ -90,27 +90,27 @@ def test_arrays_have_the_bounds_and_codes_of_single_blocks() -> None:
         "water_m": np.where(rng.random(n) < 0.6, rng.uniform(0.0, 0.5, n) * height, 0.0),
         "drainage": np.where(rng.random(n) < 0.3, "drained", "undrained"),
     }
-    others = {"pgv_m_s": 0.5, "displacement_m": 0.1}
-    found = rbfrag.predict(**blocks, **others)
-    assert isinstance(found, PredictionArray)
-    assert found.drained is not None
-    codes = codes_by_row(found.warnings, n)
+    rest = {"pgv_m_s": 0.5, "displacement_m": 0.1}
+    prediction = rbfrag.predict(**blocks, **rest)
+    assert isinstance(prediction, PredictionArray)
+    assert prediction.drained is not None
+    codes = codes_by_row(prediction.warnings, n)
     seen: set[str] = set()
     about = {"undrained", "drained", "no_drained_bound", "density_assumed", "toe_slips",
              "heel_tips", "cohesion_without_effect", "check_unit"}  # fmt: skip
     for i in range(n):
         block = {name: str(v[i]) if name == "drainage" else v[i] for name, v in blocks.items()}
         try:
-            one = rbfrag.predict(**block, **others)
+            single = rbfrag.predict(**block, **rest)
         except InputError:
-            assert np.isnan(found.probability[i])
+            assert np.isnan(prediction.probability[i])
             continue
-        own = {text.code for text in one.warnings if hasattr(text, "code")}
-        if one.probability < 1.0:
-            assert own & about == {*codes[i].split()} & about
-        seen |= own
-        bound = [found.drained[name][i] for name in BOUND]
-        expected = [np.nan] * 3 if one.drained is None else [*bound_of(one).values()]
+        block_inputs = {text.code for text in single.warnings if hasattr(text, "code")}
+        if single.probability < 1.0:
+            assert block_inputs & about == {*codes[i].split()} & about
+        seen |= block_inputs
+        bound = [prediction.drained[name][i] for name in BOUND]
+        expected = [np.nan] * 3 if single.drained is None else [*bound_of(single).values()]
         np.testing.assert_allclose(bound, np.array(expected, dtype=float), rtol=1e-10, atol=1e-15)
     assert {"undrained", "drained", "toe_slips", "cohesion_without_effect"} <= seen
 
@@ -166,8 +166,8 @@ def test_rates_have_the_drained_bound(shell: Shell) -> None:
     assert wet.drained.tolist() == dry.annual_rate.tolist()
     assert wet.annual_rate[0] > 2.0 * dry.annual_rate[0]
     words = ("--height", "4", "--width", "2", "--dip", "20", "--phi", "40", "--water", "1")
-    told = shell.json("hazard", "curve.csv", *words)
-    assert told["drained"] == {"annual_rate": pytest.approx(dry.annual_rate[0], rel=1e-12)}
+    document = shell.json("hazard", "curve.csv", *words)
+    assert document["drained"] == {"annual_rate": pytest.approx(dry.annual_rate[0], rel=1e-12)}
     assert "Drained return period 3,000 years" in shell("hazard", "curve.csv", *words).stdout
     assert shell.json("hazard", "curve.csv", *words[:-2])["drained"] is None
     Path("blocks.csv").write_text(
@@ -204,6 +204,6 @@ def test_a_bound_that_has_no_answer_is_named(shell: Shell) -> None:
     arrays = rbfrag.predict(**block, water_m=[0.93, 0.0])
     assert "no_drained_bound" in codes_by_row(arrays.warnings, 2)[0].split()
     words = [f"--{name.partition('_')[0]}={value}" for name, value in block.items()]
-    told = shell.json("predict", *words, "--water", "0.93")
-    assert told["drained"] is None
-    assert any("no drained bound" in text for text in told["warnings"])
+    document = shell.json("predict", *words, "--water", "0.93")
+    assert document["drained"] is None
+    assert any("no drained bound" in text for text in document["warnings"])

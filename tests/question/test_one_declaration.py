@@ -26,7 +26,7 @@ LINES = {
 COLUMNS = 'MEASURES = ("pga_g", '
 """The columns of stored measures in the schema begin so."""
 
-ASKED = """
+INPUTS = """
 import json, sys
 import numpy as np
 import rbfrag
@@ -93,16 +93,16 @@ def copied(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def run(folder: Path, *arguments: str) -> str:
-    done = subprocess.run(
+    process = subprocess.run(
         [sys.executable, *arguments], cwd=folder, capture_output=True, text=True, check=False,
         env={**os.environ, "PYTHONPATH": str(folder), "COLUMNS": "200"},
     )  # fmt: skip
-    assert done.returncode == 0, done.stderr
-    return done.stdout + done.stderr
+    assert process.returncode == 0, process.stderr
+    return process.stdout + process.stderr
 
 
 def test_python_and_requests_know_it(copied: Path) -> None:
-    answer = json.loads(run(copied, "-c", ASKED).partition("\n")[0])  # the service logs below
+    answer = json.loads(run(copied, "-c", INPUTS).partition("\n")[0])  # the service logs below
     assert answer["same"]
     for warnings in answer["warnings"]:
         assert "hardness is ignored: no model uses it" in warnings
@@ -119,14 +119,14 @@ def test_the_shell_and_its_tables_know_it(copied: Path) -> None:
     assert "Rebound hardness of the rock [MPa]" in run(
         copied, "-m", "rbfrag.cli.main", "predict", "--help-all"
     )
-    told = run(
+    document = run(
         copied, "-m", "rbfrag.cli.main", "predict", "--p2", "3", "--kr", "0.1", "--pgv", "0.6",
         "--hardness", "40",
     )  # fmt: skip
-    assert "ignored: no model uses it" in told
+    assert "ignored: no model uses it" in document
     (copied / "blocks.csv").write_text("p2,kr,PGV [cm/s],Rebound [MPa]\n3,0.1,60,40\n")
-    told = run(copied, "-m", "rbfrag.cli.main", "predict", "--blocks", "blocks.csv")
-    assert "column ignored: Rebound [MPa]" in told
+    document = run(copied, "-m", "rbfrag.cli.main", "predict", "--blocks", "blocks.csv")
+    assert "column ignored: Rebound [MPa]" in document
 
 
 MEASURED = """
@@ -147,11 +147,11 @@ def test_a_measure_is_a_line_too(copied: Path) -> None:
     assert any("csi_g was not used" in text for text in answer["warnings"])
     assert "csi_g = 7 g is larger than recorded" in answer["warnings"]
     assert "``csi_g``: Characteristic intensity [g]" in answer["help"]
-    told = run(copied, "-m", "rbfrag.cli.main", "predict", "--help-all")
-    assert "--csi" in told
+    document = run(copied, "-m", "rbfrag.cli.main", "predict", "--help-all")
+    assert "--csi" in document
     (copied / "csi.csv").write_text("p2,kr,PGV [cm/s],csi [%g]\n3,0.1,60,40\n")
-    told = run(copied, "-m", "rbfrag.cli.main", "predict", "--blocks", "csi.csv", "--json")
-    assert "csi" in told
+    document = run(copied, "-m", "rbfrag.cli.main", "predict", "--blocks", "csi.csv", "--json")
+    assert "csi" in document
 
 
 def test_a_stored_measure_is_its_column_in_addition(tmp_path: Path) -> None:

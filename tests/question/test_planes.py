@@ -13,8 +13,8 @@ import rbfrag
 from rbfrag.errors import InputError
 from rbfrag.exchange.block_rows import read_blocks
 from rbfrag.question.sections import in_section
+from rbfrag.rockmasses.distributions import OrientationSet, orientation_set
 from rbfrag.rockmasses.file import read_rock_mass
-from rbfrag.rockmasses.orientations import OrientationSet, orientation_set
 from rbfrag.solver.block.planes import Plane, line_of, plane_of, section_of
 
 ROWS = [
@@ -33,10 +33,10 @@ UPRIGHT = "88/85 86/268 84/92 89/271 87/88 85/95"
 )
 def test_section(base, back, face, s1, s2, beta, gamma, s1_in, s2_in, says) -> None:  # type: ignore[no-untyped-def]
     planes = {"base": base, "back": back, "face": face}
-    given, said = in_section({**planes, "s1_m": s1, "s2_m": s2})
-    read = [given[name] for name in ("beta_deg", "gamma_deg", "s1_m", "s2_m")]
+    inputs, message = in_section({**planes, "s1_m": s1, "s2_m": s2})
+    read = [inputs[name] for name in ("beta_deg", "gamma_deg", "s1_m", "s2_m")]
     assert read == pytest.approx([beta, gamma, s1_in, s2_in], abs=6e-5)
-    assert [says in text for text in said] == ([True] if says else [])
+    assert [says in text for text in message] == ([True] if says else [])
 
 
 def test_wedge_is_rejected() -> None:
@@ -84,18 +84,18 @@ def test_steep_base_and_a_plane_stated_twice() -> None:
 def test_every_door_answers_as_the_section(tmp_path: Path) -> None:
     planes = {"base": "4/150", "back": "78/095", "face": "80/090"}
     shape = {"s1_m": 2.0, "s2_m": 0.4, "phi_deg": 40.0}
-    own, _ = in_section({**planes, **shape})
-    wanted = rbfrag.predict(**own, pgv_m_s=2.0).probability
-    assert 0.0 < wanted < 1.0
-    assert rbfrag.predict(**planes, **shape, pgv_m_s=2.0).probability == wanted
+    expected, _ = in_section({**planes, **shape})
+    target = rbfrag.predict(**expected, pgv_m_s=2.0).probability
+    assert 0.0 < target < 1.0
+    assert rbfrag.predict(**planes, **shape, pgv_m_s=2.0).probability == target
     many = rbfrag.predict(**{**planes, "base": ["4/150", "35/140"]}, **shape, pgv_m_s=2.0)
-    assert many.probability[0] == wanted
+    assert many.probability[0] == target
     assert "strikes 50 deg off" in many.reason[1]
     table = tmp_path / "blocks.csv"
     table.write_text("s1_m,s2_m,phi_deg,base,back,face\n2,0.4,40,4/150,78/095,80/090\n")
     rows = read_blocks(table).blocks
     kr = rbfrag.predict(rows["p2_1_s2"][0], rows["kr"][0], pgv_m_s=2.0)
-    assert kr.probability == wanted
+    assert kr.probability == target
 
 
 def test_one_block_loads_no_numpy() -> None:

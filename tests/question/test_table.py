@@ -50,8 +50,8 @@ def test_a_column_states_a_field_under_any_of_its_names(
 def test_no_name_stands_for_two_fields() -> None:
     owners: dict[str, str] = {}
     for name in COLUMNS:
-        for each in {name, column_of(name), *INPUTS[name].aliases}:
-            assert owners.setdefault(each, name) == name, each
+        for item in {name, column_of(name), *INPUTS[name].aliases}:
+            assert owners.setdefault(item, name) == name, item
 
 
 @pytest.mark.parametrize(
@@ -74,13 +74,13 @@ def test_what_cannot_be_meant_is_rejected(header: list[str], words: str) -> None
 
 def test_other_columns_are_rejected_where_they_sound_like_input_and_named_elsewhere() -> None:
     header = ["height_m", "width_m", "dip direction", "note"]
-    stated = columns_in(header, "blocks.csv", COLUMNS)
+    value = columns_in(header, "blocks.csv", COLUMNS)
     with pytest.raises(InputError, match="'dip direction' is unknown; for the dip of"):
-        stated.check_unused("blocks.csv", stated.columns)
+        value.check_unused("blocks.csv", value.columns)
     # of a block given by its numbers the dip does not matter
-    stated.check_unused("blocks.csv", ("p2", "kr"))
-    stated.check_unused("blocks.csv", ("height_m", "width_m", "beta_deg"))
-    (warning,) = stated.ignored(header, ("height_m", "width_m"))
+    value.check_unused("blocks.csv", ("p2", "kr"))
+    value.check_unused("blocks.csv", ("height_m", "width_m", "beta_deg"))
+    (warning,) = value.ignored(header, ("height_m", "width_m"))
     assert warning == "columns ignored: dip direction, note"
     assert warning.code == "ignored_columns"
     left_out = columns_in(header, "blocks.csv", COLUMNS, ["dip direction"])
@@ -99,8 +99,8 @@ def test_columns_of_an_earlier_answer_are_named_as_ignored(tmp_path: Path) -> No
 
 
 def test_losses_are_in_any_currency() -> None:
-    stated = columns_in(["loss [EUR]", "weight (t)"], "a.csv", COLUMNS)
-    assert [stated.columns[name].factor for name in ("loss", "weight")] == [1.0, 1.0]
+    value = columns_in(["loss [EUR]", "weight (t)"], "a.csv", COLUMNS)
+    assert [value.columns[name].factor for name in ("loss", "weight")] == [1.0, 1.0]
 
 
 def test_a_name_for_a_column_states_its_field_and_unit() -> None:
@@ -129,12 +129,12 @@ def test_the_row_of_the_names(rows: list[list[object]], number: int) -> None:
 
 
 def answered(
-    tmp_path: Path, text: str, **given: float
+    tmp_path: Path, text: str, **arguments: float
 ) -> tuple[list[dict[str, str]], tuple[str, ...]]:
     source, target = tmp_path / "blocks.csv", tmp_path / "answers.csv"
     source.write_text(text)
-    told = predict_table(source, target, inputs=given, model=None, level=0.95, db=None)
-    warnings = told.warnings
+    document = predict_table(source, target, inputs=arguments, model=None, level=0.95, db=None)
+    warnings = document.warnings
     with target.open(newline="", encoding="utf-8") as file:
         return list(csv.DictReader(file)), warnings
 

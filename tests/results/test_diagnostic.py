@@ -17,16 +17,16 @@ __all__ = ["shell"]
 
 def texts_in_code() -> set[str]:
     """Return all texts in the package's code, where codes are used, without their list."""
-    found: set[str] = set()
+    result: set[str] = set()
     for path in (ROOT / "rbfrag").rglob("*.py"):
         if path.name != "diagnostic.py":
             tree = ast.parse(path.read_text(encoding="utf-8"))
-            found |= {
+            result |= {
                 node.value
                 for node in ast.walk(tree)
                 if isinstance(node, ast.Constant) and isinstance(node.value, str)
             }
-    return found
+    return result
 
 
 def test_each_code_is_used_and_means_something() -> None:
@@ -58,8 +58,10 @@ def test_documents_have_a_diagnostic_for_each_warning(shell: Shell, tmp_path: Pa
     ]
     codes = []
     for document in documents:
-        assert [each["text"] for each in document["diagnostics"]] == document["warnings"]
-        codes.append({each["code"] for each in document["diagnostics"]})
+        assert [diagnostic["text"] for diagnostic in document["diagnostics"]] == document[
+            "warnings"
+        ]
+        codes.append({diagnostic["code"] for diagnostic in document["diagnostics"]})
     assert {"undrained", "extrapolation", "unused_measures", "density_assumed"} <= codes[0]
     assert {"undrained", "curve_ends", "single_component"} <= codes[1]
     assert "back_friction_neglected" in codes[2]

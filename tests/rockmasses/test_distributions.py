@@ -54,11 +54,11 @@ def test_truncated_von_mises() -> None:
     values = law("von_mises", mean=45.0, kappa=30.0, low=40.0, high=60.0).sample(
         N, np.random.default_rng(7)
     )
-    whole = stats.vonmises(30.0)
-    low, high = (whole.cdf(math.radians(end - 45.0)) for end in (40.0, 60.0))
+    complete = stats.vonmises(30.0)
+    low, high = (complete.cdf(math.radians(end - 45.0)) for end in (40.0, 60.0))
 
     def share(value: np.ndarray) -> np.ndarray:
-        return (whole.cdf(np.radians(value - 45.0)) - low) / (high - low)
+        return (complete.cdf(np.radians(value - 45.0)) - low) / (high - low)
 
     assert values.min() >= 40.0
     assert values.max() <= 60.0
@@ -66,10 +66,10 @@ def test_truncated_von_mises() -> None:
 
 
 def test_measurements_come_back_and_equally_often() -> None:
-    stated = (18.0, 22.5, 22.5, 31.0)
-    values = law("measured", values=list(stated)).sample(N, np.random.default_rng(8))
-    found, counts = np.unique(values, return_counts=True)
-    assert found.tolist() == [18.0, 22.5, 31.0]
+    value = (18.0, 22.5, 22.5, 31.0)
+    values = law("measured", values=list(value)).sample(N, np.random.default_rng(8))
+    result, counts = np.unique(values, return_counts=True)
+    assert result.tolist() == [18.0, 22.5, 31.0]
     expected = N * np.array([0.25, 0.5, 0.25])
     assert stats.chisquare(counts, expected).pvalue > 0.01
 

@@ -12,12 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rbfrag.errors import InputError
-from rbfrag.rockmasses.counts import (
-    crossings,
-    cumulative_counts,
-    mode_counts,
-    sorted_yields,
-)
+from rbfrag.rockmasses.counts import crossings, cumulative_counts, mode_counts, sorted_yields
 from rbfrag.rockmasses.distributions import LAWS
 from rbfrag.rockmasses.joint_sets import IMPOSSIBLE, VARIABLES, RockMass
 from rbfrag.solver.block.geometry import Block
@@ -56,15 +51,15 @@ class TestExample3:
     """Table 3.4, 20,000 samples: 61.5 % slides, 38.5 % slumps, counts equal at 0.415 g."""
 
     def test_shares_and_crossing_within_sampling_error(self) -> None:
-        made = mass().realise(20_000, 1)
-        counts = mode_counts(made)
+        result = mass().realise(20_000, 1)
+        counts = mode_counts(result)
         assert counts["topple"].count == counts["confined_topple"].count == 0
         for mode, published in (("slide", 0.615), ("slump", 0.385)):
-            found = counts[mode]  # type: ignore[index]
-            assert found.share_error == pytest.approx(0.0034, abs=1e-4)
+            answer = counts[mode]  # type: ignore[index]
+            assert answer.share_error == pytest.approx(0.0034, abs=1e-4)
             # both numbers carry the error of their own 20,000 samples
-            assert abs(found.share - published) < 2.0 * math.sqrt(2.0) * found.share_error
-        (crossing,) = crossings(made)
+            assert abs(answer.share - published) < 2.0 * math.sqrt(2.0) * answer.share_error
+        (crossing,) = crossings(result)
         assert (crossing.below, crossing.above) == ("slump", "slide")
         assert crossing.standard_error_g == pytest.approx(0.003, abs=5e-4)
         assert abs(crossing.pga_g - 0.415) < 2.0 * math.sqrt(2.0) * crossing.standard_error_g
@@ -73,9 +68,9 @@ class TestExample3:
 
     def test_the_stated_errors_are_those_of_repeated_samples(self) -> None:
         samples = [mass().realise(4_000, seed) for seed in range(40)]
-        shares = [mode_counts(made)["slide"] for made in samples]
-        met = [crossings(made) for made in samples]
-        assert {len(found) for found in met} == {1}
+        shares = [mode_counts(result)["slide"] for result in samples]
+        met = [crossings(result) for result in samples]
+        assert {len(answer) for answer in met} == {1}
         for values, errors in (
             ([s.share for s in shares], [s.share_error for s in shares]),
             ([c[0].pga_g for c in met], [c[0].standard_error_g for c in met]),
@@ -120,10 +115,10 @@ class TestStreams:
 
     def test_variables_are_independent(self) -> None:
         law = {"distribution": "uniform", "low": 1.0, "high": 2.0}
-        made = RockMass.of({**dict.fromkeys(TABLE_3_4, law), "friction.phi_back_deg": law}).draw(
+        result = RockMass.of({**dict.fromkeys(TABLE_3_4, law), "friction.phi_back_deg": law}).draw(
             20_000, 1
         )
-        values = np.array([made[key] for key in (*TABLE_3_4, "friction.phi_back_deg")])
+        values = np.array([result[key] for key in (*TABLE_3_4, "friction.phi_back_deg")])
         correlation = np.corrcoef(values) - np.eye(len(values))
         assert np.abs(correlation).max() < 4.0 / math.sqrt(20_000)
 
@@ -133,26 +128,26 @@ class TestStreams:
 
 class TestBlocks:
     def test_every_block_is_the_one_that_its_numbers_make(self) -> None:
-        made = RockMass.of(WILD).realise(400, 2)
-        for i in np.flatnonzero(made.is_block):
-            block = Block.from_fractures(made.s1_m[i], made.s2_m[i], made.gamma_deg[i])
-            found = stability(
+        result = RockMass.of(WILD).realise(400, 2)
+        for i in np.flatnonzero(result.is_block):
+            block = Block.from_fractures(result.s1_m[i], result.s2_m[i], result.gamma_deg[i])
+            answer = stability(
                 block,
-                beta_deg=made.beta_deg[i],
-                phi_deg=made.phi_deg[i],
-                phi_back_deg=made.phi_back_deg[i],
+                beta_deg=result.beta_deg[i],
+                phi_deg=result.phi_deg[i],
+                phi_back_deg=result.phi_back_deg[i],
             )
-            assert made.stability.mode[i] == found.mode
-            assert made.stability.state[i] == found.state
-            assert made.stability.yield_acceleration[i] == found.yield_acceleration
-            assert made.stability.p2[i] == block.p2
+            assert result.stability.mode[i] == answer.mode
+            assert result.stability.state[i] == answer.state
+            assert result.stability.yield_acceleration[i] == answer.yield_acceleration
+            assert result.stability.p2[i] == block.p2
 
     def test_counts_add_up_with_every_mode_and_state(self) -> None:
-        made = RockMass.of(WILD).realise(20_000, 2)
-        counts = mode_counts(made)
+        result = RockMass.of(WILD).realise(20_000, 2)
+        counts = mode_counts(result)
         assert tuple(counts) == MODES
-        assert sum(c.count for c in counts.values()) == made.n_blocks
-        assert made.n_blocks + sum(made.impossible.values()) == made.n == 20_000
+        assert sum(c.count for c in counts.values()) == result.n_blocks
+        assert result.n_blocks + sum(result.impossible.values()) == result.n == 20_000
         assert sum(c.share for c in counts.values()) == pytest.approx(1.0, abs=1e-12)
         states: dict[str, int] = {}
         for count in counts.values():
@@ -165,17 +160,21 @@ class TestBlocks:
         assert min(states.values()) > 0
 
     def test_cumulative_counts_are_counts(self) -> None:
-        made = RockMass.of(WILD).realise(5_000, 2)
-        found = made.stability
+        result = RockMass.of(WILD).realise(5_000, 2)
+        answer = result.stability
         pga = np.array([0.0, 0.1, 0.35, 1.0, 50.0])
         for mode in MODES:
             brute = [
-                int(np.sum(made.is_block & (found.mode == mode) & (found.yield_acceleration <= a)))
+                int(
+                    np.sum(
+                        result.is_block & (answer.mode == mode) & (answer.yield_acceleration <= a)
+                    )
+                )
                 for a in pga
             ]
-            assert cumulative_counts(made, mode, pga).tolist() == brute
-            locked = mode_counts(made)[mode].states["locked"]
-            assert sorted_yields(made, mode).size == mode_counts(made)[mode].count - locked
+            assert cumulative_counts(result, mode, pga).tolist() == brute
+            locked = mode_counts(result)[mode].states["locked"]
+            assert sorted_yields(result, mode).size == mode_counts(result)[mode].count - locked
 
     def test_size_scales_the_spacings_and_nothing_else(self) -> None:
         small, large = mass().realise(300, 1), mass(block__size_factor=2.0).realise(300, 1)
@@ -195,8 +194,8 @@ class TestBlocks:
         assert np.allclose(b.kr_at_rest[both], a.kr_at_rest[both], rtol=1e-12)
 
     def test_without_back_fracture_nothing_slumps_or_is_confined(self) -> None:
-        made = RockMass.of({**WILD, "block.back_fracture": False}).realise(5_000, 2)
-        counts = mode_counts(made)
+        result = RockMass.of({**WILD, "block.back_fracture": False}).realise(5_000, 2)
+        counts = mode_counts(result)
         assert counts["confined_topple"].count == 0
         assert counts["slump"].states["stable"] == counts["slump"].states["locked"] == 0
         assert counts["topple"].count > 0
@@ -220,23 +219,23 @@ class TestImpossible:
 
     @pytest.mark.parametrize(("changes", "code"), CASES)
     def test_they_are_counted_with_their_reason(self, changes: dict[str, Any], code: int) -> None:
-        made = mass(**changes).realise(2_000, 1)
-        share = made.impossible[IMPOSSIBLE[code]] / 2_000
+        result = mass(**changes).realise(2_000, 1)
+        share = result.impossible[IMPOSSIBLE[code]] / 2_000
         assert 0.1 < share < 0.6
-        bad = ~made.is_block
-        assert set(made.reason[bad]) == set(made.impossible)
-        assert set(made.reason[~bad]) == {""}
-        assert sum(c.count for c in mode_counts(made).values()) == made.n_blocks
+        bad = ~result.is_block
+        assert set(result.reason[bad]) == set(result.impossible)
+        assert set(result.reason[~bad]) == {""}
+        assert sum(c.count for c in mode_counts(result).values()) == result.n_blocks
 
     def test_every_reason_but_slivers_is_met_above(self) -> None:
         assert {code for _, code in self.CASES} == set(range(1, len(IMPOSSIBLE) - 1))
 
     def test_slivers(self) -> None:
-        made = mass(back__spacing_m={"distribution": "measured", "values": [1e-20, 0.6]})
-        found = made.realise(400, 1)
-        sliver = found.reason_code == len(IMPOSSIBLE) - 1
+        result = mass(back__spacing_m={"distribution": "measured", "values": [1e-20, 0.6]})
+        answer = result.realise(400, 1)
+        sliver = answer.reason_code == len(IMPOSSIBLE) - 1
         assert 100 < int(sliver.sum()) < 300
-        assert np.all(found.s2_m[sliver] == 1e-20)
+        assert np.all(answer.s2_m[sliver] == 1e-20)
 
     def test_no_block_at_all_is_rejected_with_the_reasons(self) -> None:
         with pytest.raises(InputError, match=r"none of 50 realisations is a block: 50 times gamma"):

@@ -7,11 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rbfrag.cli.parameters.block import charted_blocks
+from rbfrag.cli.inputs import charted_blocks
 from rbfrag.errors import InputError
 from rbfrag.motions.ground_motion import GroundMotion
-from rbfrag.rockmasses.counts import mode_counts
-from rbfrag.rockmasses.failures import failures
+from rbfrag.rockmasses.counts import failures, mode_counts
 from rbfrag.rockmasses.file import rock_mass_of_toml
 from rbfrag.rockmasses.joint_sets import IMPOSSIBLE, Realisations, RockMass
 from rbfrag.rockmasses.report import as_dict, block_columns
@@ -47,16 +46,16 @@ def test_each_block_yields_as_it_would_alone() -> None:
     density = many.rock_mass.draw(600, 4)["block.density_kg_m3"]
     assert many.cohesion_pa.std() > 0.0
     for i in np.flatnonzero(many.is_block).tolist():
-        one = stability(
+        single = stability(
             Block.from_fractures(many.s1_m[i], many.s2_m[i], many.gamma_deg[i]),
             beta_deg=many.beta_deg[i],
             phi_deg=many.phi_deg[i],
             cohesion_pa=many.cohesion_pa[i],
             density_kg_m3=density[i],
         )
-        assert many.stability.mode[i] == one.mode
-        assert many.stability.state[i] == one.state
-        assert many.stability.yield_acceleration[i] == one.yield_acceleration
+        assert many.stability.mode[i] == single.mode
+        assert many.stability.state[i] == single.state
+        assert many.stability.yield_acceleration[i] == single.yield_acceleration
     assert {mode.count > 0 for mode in mode_counts(many).values()} == {True}
 
 
@@ -92,11 +91,11 @@ def test_a_toe_that_lifts_before_the_bond_breaks_is_told() -> None:
 def test_a_bond_holds_up_to_its_yield_and_its_break_is_counted() -> None:
     many = drawn(TOML + COHESION, 60)
     plan = plan_shaking(many, LEVEL, scales=(0.2, 1.0))
-    known = (many.cohesion_pa > 0.0) & (many.stability.state_code == STABLE) & many.is_block
-    known &= (many.stability.mode_code != TOPPLE) & (many.stability.yield_acceleration > 0.0)
-    assert not plan.moves[:, known].any()
-    for code, peak_g in zip(plan.code[:, known], (0.4, 2.0), strict=True):
-        breaks = many.stability.yield_acceleration[known] < peak_g
+    expected = (many.cohesion_pa > 0.0) & (many.stability.state_code == STABLE) & many.is_block
+    expected &= (many.stability.mode_code != TOPPLE) & (many.stability.yield_acceleration > 0.0)
+    assert not plan.moves[:, expected].any()
+    for code, peak_g in zip(plan.code[:, expected], (0.4, 2.0), strict=True):
+        breaks = many.stability.yield_acceleration[expected] < peak_g
         assert breaks.any()
         assert not breaks.all()
         assert np.array_equal(code == BOND_BREAKS, breaks)
@@ -147,11 +146,11 @@ def test_a_scenario_leaves_out_slides_with_a_bond(
 
 
 def test_a_chart_of_modes_says_that_it_knows_no_cohesion(tmp_path: Path) -> None:
-    for text, told in ((TOML, False), (TOML + COHESION, True)):
+    for text, output in ((TOML, False), (TOML + COHESION, True)):
         file = tmp_path / "mass.toml"
         file.write_text("realisations = 50\n" + text)
         shown = charted_blocks(None, str(file), {"phi_deg": 30.0})
-        assert any("without cohesion" in warning for warning in shown.warnings) == told
+        assert any("without cohesion" in warning for warning in shown.warnings) == output
 
 
 @pytest.mark.parametrize(

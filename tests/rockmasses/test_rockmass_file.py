@@ -51,11 +51,11 @@ def written(folder: Path, name: str, text: str) -> Path:
 
 
 def test_both_forms_say_the_same(tmp_path: Path) -> None:
-    found = read_rock_mass(written(tmp_path, "a.toml", TOML))
-    assert found == read_rock_mass(written(tmp_path, "a.CSV", CSV))
-    assert (found.realisations, found.seed, found.back_fracture) == (500, 7, False)
-    assert found.variables["back.dip_deg"].values == (41.0, 44.5)
-    assert found.realise().n == 500
+    parsed = read_rock_mass(written(tmp_path, "a.toml", TOML))
+    assert parsed == read_rock_mass(written(tmp_path, "a.CSV", CSV))
+    assert (parsed.realisations, parsed.seed, parsed.back_fracture) == (500, 7, False)
+    assert parsed.variables["back.dip_deg"].values == (41.0, 44.5)
+    assert parsed.realise().n == 500
 
 
 def test_both_forms_state_the_drainage(tmp_path: Path) -> None:
@@ -97,9 +97,9 @@ def test_planes_in_both_forms(tmp_path: Path) -> None:
         'plane = ["64/084", "65/085", "66/087"]\nspacing_m = { distribution = "lognormal", '
         "median = 0.6, sd_ln = 0.1 }\n[friction]\nphi_deg = 40.0\n"
     )
-    found = read_rock_mass(written(tmp_path, "mass.csv", PLANES))
-    assert found == read_rock_mass(written(tmp_path, "mass.toml", toml))
-    assert found.variables["base.dip_deg"].scale == pytest.approx(349.97, rel=1e-3)
+    parsed = read_rock_mass(written(tmp_path, "mass.csv", PLANES))
+    assert parsed == read_rock_mass(written(tmp_path, "mass.toml", toml))
+    assert parsed.variables["base.dip_deg"].scale == pytest.approx(349.97, rel=1e-3)
     for old, new, words in (
         ("70/090", "70", "bad.csv: face.plane = '70' is not dip/dip direction"),
         ("base.csv", "none.csv", "none.csv: no such file"),

@@ -30,36 +30,38 @@ SLOPE: dict[str, object] = {**WILD, "base.dip_deg": 5.0, "back.dip_deg": 45.0}
 
 
 @pytest.fixture(scope="module")
-def made() -> Realisations:
+def realisations() -> Realisations:
     return RockMass.of(WILD).realise(1_500, 4)
 
 
-def test_average_is_that_of_single_predictions(made: Realisations, model: FragilityModel) -> None:
-    answer = scenario(made, {"pgv_m_s": 0.4}, model=model, level=0.9)
+def test_average_is_that_of_single_predictions(
+    realisations: Realisations, model: FragilityModel
+) -> None:
+    answer = scenario(realisations, {"pgv_m_s": 0.4}, model=model, level=0.9)
     singles: dict[str, list[tuple[float, float, float]]] = {}
-    for i in range(made.n):
-        found = made.stability
-        mode, state = str(found.mode[i]), str(found.state[i])
-        given: tuple[float, float, float] | None = None
-        if not made.is_block[i]:
+    for i in range(realisations.n):
+        result = realisations.stability
+        mode, state = str(result.mode[i]), str(result.state[i])
+        inputs: tuple[float, float, float] | None = None
+        if not realisations.is_block[i]:
             pass
         elif state == "unstable":
-            given = (1.0, 1.0, 1.0)
+            inputs = (1.0, 1.0, 1.0)
             assert answer.reason[i] == "unstable"
         elif mode == "topple":
-            one = predict(
-                found.p2[i], found.yield_acceleration[i], pgv_m_s=0.4, model=model, level=0.9
+            item = predict(
+                result.p2[i], result.yield_acceleration[i], pgv_m_s=0.4, model=model, level=0.9
             )
-            given = (one.probability, one.ci_low, one.ci_high)
-            assert answer.in_domain[i] == one.in_domain
+            inputs = (item.probability, item.ci_low, item.ci_high)
+            assert answer.in_domain[i] == item.in_domain
         else:
             assert answer.reason[i] == (LOCKED if state == "locked" else UNCOVERED)
-        if given is None:
+        if inputs is None:
             assert math.isnan(answer.probability[i])
         else:
-            assert answer.probability[i] == pytest.approx(given[0], rel=1e-12)
-            singles.setdefault(mode, []).append(given)
-    everything = [one for several in singles.values() for one in several]
+            assert answer.probability[i] == pytest.approx(inputs[0], rel=1e-12)
+            singles.setdefault(mode, []).append(inputs)
+    everything = [item for several in singles.values() for item in several]
     modes = {mode.mode: mode for mode in answer.modes}
     for several, average in [(everything, answer.covered)] + [
         (several, modes[mode].covered)  # type: ignore[index]
@@ -76,9 +78,11 @@ def test_average_is_that_of_single_predictions(made: Realisations, model: Fragil
     assert {"topple", "slide", "confined_topple"} <= set(singles)
 
 
-def test_shares_of_covered_and_uncovered_add_up(made: Realisations, model: FragilityModel) -> None:
-    answer = scenario(made, {"pgv_m_s": 0.4}, model=model)
-    assert sum(mode.count for mode in answer.modes) == made.n_blocks
+def test_shares_of_covered_and_uncovered_add_up(
+    realisations: Realisations, model: FragilityModel
+) -> None:
+    answer = scenario(realisations, {"pgv_m_s": 0.4}, model=model)
+    assert sum(mode.count for mode in answer.modes) == realisations.n_blocks
     assert sum(answer.uncovered_share.values()) + answer.covered_share == pytest.approx(1.0)
     assert set(answer.uncovered_share) == {"slide", "slump", "confined_topple"}
     assert [mode.mode for mode in answer.modes if mode.has_model] == ["topple"]
@@ -101,10 +105,10 @@ def test_the_sampling_error_is_that_of_repeated_samples(model: FragilityModel) -
 
 def test_doubts_about_the_blocks_are_told_with_their_number(model: FragilityModel) -> None:
     mass = RockMass.of({**WILD, "block.size_factor": {**UNIFORM, "low": 0.02, "high": 2.0}})
-    made = mass.realise(800, 1)
-    answer = scenario(made, {"pgv_m_s": 0.4}, model=model)
-    asked = np.array([reason != UNCOVERED for reason in answer.reason])
-    small = int(np.sum(["p2 is outside the fitted range" in r for r in answer.reason[asked]]))
+    result = mass.realise(800, 1)
+    answer = scenario(result, {"pgv_m_s": 0.4}, model=model)
+    inputs = np.array([reason != UNCOVERED for reason in answer.reason])
+    small = int(np.sum(["p2 is outside the fitted range" in r for r in answer.reason[inputs]]))
     assert small > 0
     assert any(
         text.startswith(f"{small} of ") and "p2 is outside" in text for text in answer.warnings
@@ -134,36 +138,40 @@ def test_no_model_is_looked_up_where_no_block_needs_one(tmp_path: Path) -> None:
     ],
 )
 def test_rejections(
-    made: Realisations, model: FragilityModel, measures: dict[str, float], words: str
+    realisations: Realisations, model: FragilityModel, measures: dict[str, float], words: str
 ) -> None:
     with pytest.raises(InputError, match=words):
-        scenario(made, measures, model=model)
+        scenario(realisations, measures, model=model)
 
 
-def test_a_level_that_is_none_is_rejected(made: Realisations, model: FragilityModel) -> None:
+def test_a_level_that_is_none_is_rejected(
+    realisations: Realisations, model: FragilityModel
+) -> None:
     with pytest.raises(InputError, match=r"level = 1\.0"):
-        scenario(made, {"pgv_m_s": 0.4}, model=model, level=1.0)
+        scenario(realisations, {"pgv_m_s": 0.4}, model=model, level=1.0)
 
 
 def test_vertical_acceleration_of_the_file_is_rejected(model: FragilityModel) -> None:
-    made = RockMass.of({**WILD, "block.kv": 0.1}).realise(100, 1)
+    result = RockMass.of({**WILD, "block.kv": 0.1}).realise(100, 1)
     with pytest.raises(InputError, match=r"block\.kv is not supported"):
-        scenario(made, {"pgv_m_s": 0.4}, model=model)
+        scenario(result, {"pgv_m_s": 0.4}, model=model)
 
 
 def test_no_shaking_topples_what_is_unstable_and_nothing_else(
-    made: Realisations, model: FragilityModel
+    realisations: Realisations, model: FragilityModel
 ) -> None:
-    answer = scenario(made, {"pgv_m_s": 0.0}, model=model)
-    falls = made.is_block & (made.stability.state == "unstable")
+    answer = scenario(realisations, {"pgv_m_s": 0.0}, model=model)
+    falls = realisations.is_block & (realisations.stability.state == "unstable")
     covered = np.isfinite(answer.probability)
     assert np.array_equal(answer.probability[covered] == 1.0, falls[covered])
     assert set(answer.probability[covered]) == {0.0, 1.0}
 
 
-def test_the_block_table_has_every_realisation(made: Realisations, model: FragilityModel) -> None:
-    answer = scenario(made, {"pgv_m_s": 0.4}, model=model)
-    plain, full = block_columns(made), block_columns(made, answer)
+def test_the_block_table_has_every_realisation(
+    realisations: Realisations, model: FragilityModel
+) -> None:
+    answer = scenario(realisations, {"pgv_m_s": 0.4}, model=model)
+    plain, full = block_columns(realisations), block_columns(realisations, answer)
     assert list(plain)[:5] == ["block_id", "p2_1_s2", "kr", "mode", "weight"]
     assert list(full)[-8:] == [
         "probability",
@@ -175,9 +183,9 @@ def test_the_block_table_has_every_realisation(made: Realisations, model: Fragil
         "how",
         "reason",
     ]
-    assert {column.shape for column in full.values()} == {(made.n,)}
-    assert plain["weight"].sum() == made.n_blocks < made.n
-    bad = ~made.is_block
+    assert {column.shape for column in full.values()} == {(realisations.n,)}
+    assert plain["weight"].sum() == realisations.n_blocks < realisations.n
+    bad = ~realisations.is_block
     assert set(plain["mode"][bad]) == {""}
     assert np.isnan(plain["p2_1_s2"][bad]).all()
     assert "" not in plain["reason"][bad]
@@ -187,10 +195,13 @@ def test_the_block_table_has_every_realisation(made: Realisations, model: Fragil
 
 
 def test_the_report_is_plain_and_doubts_many_impossible_blocks(
-    made: Realisations, model: FragilityModel
+    realisations: Realisations, model: FragilityModel
 ) -> None:
     document = as_dict(
-        made, mode_counts(made), crossings(made), scenario(made, {"pgv_m_s": 0.4}, model=model)
+        realisations,
+        mode_counts(realisations),
+        crossings(realisations),
+        scenario(realisations, {"pgv_m_s": 0.4}, model=model),
     )
     assert document["realisations"] == 1_500
     assert document["blocks"] + sum(document["impossible"].values()) == 1_500
@@ -199,8 +210,8 @@ def test_the_report_is_plain_and_doubts_many_impossible_blocks(
     assert document["scenario"]["covered_only"]["covered"] < document["blocks"]
 
 
-def test_an_error_that_cannot_be_told_is_null_in_the_report(made: Realisations) -> None:
+def test_an_error_that_cannot_be_told_is_null_in_the_report(realisations: Realisations) -> None:
     crossing = EqualCounts("slump", "slide", 0.3, math.inf, 10.0)
-    (told,) = as_dict(made, mode_counts(made), [crossing])["crossings"]
-    assert told["standard_error_g"] is None
-    assert told["pga_g"] == 0.3
+    (document,) = as_dict(realisations, mode_counts(realisations), [crossing])["crossings"]
+    assert document["standard_error_g"] is None
+    assert document["pga_g"] == 0.3

@@ -13,8 +13,9 @@ from rbfrag.errors import InputError
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2 as G
 from rbfrag.rockmasses import shaking as rockmass_shaken
-from rbfrag.rockmasses.failures import failures, outcome_columns
+from rbfrag.rockmasses.counts import failures
 from rbfrag.rockmasses.joint_sets import Realisations, RockMass
+from rbfrag.rockmasses.report import outcome_columns
 from rbfrag.rockmasses.shaking import (
     OPEN,
     OUTCOMES,
@@ -42,7 +43,7 @@ FOUR_MODES = RockMass.of(DESCRIPTION)
 WATER = {"back.water_m": {**UNIFORM, "low": 0.0, "high": 0.6}, "block.density_kg_m3": 2600.0}
 
 
-def classify_block(**stated: object) -> Realisations:
+def classify_block(**value: object) -> Realisations:
     """A rock mass of three blocks that are all alike."""
     return RockMass.of(
         {
@@ -51,7 +52,7 @@ def classify_block(**stated: object) -> Realisations:
             "back.dip_deg": 80.0,
             "back.spacing_m": 2.0,
             "friction.phi_deg": 30.0,
-            **stated,
+            **value,
         }
     ).realise(3, 1)
 
@@ -67,57 +68,61 @@ def record(seed: int = 3, pga_g: float = 0.6) -> GroundMotion:
     return GroundMotion(pga_g * a / np.abs(a).max(), 0.01)
 
 
-def shake(made: Realisations, motion: GroundMotion, chunk: int = 50, **asked: object) -> ShakenMass:
-    plan = plan_shaking(made, motion, **asked)  # type: ignore[arg-type]
+def shake(
+    result: Realisations, motion: GroundMotion, chunk: int = 50, **inputs: object
+) -> ShakenMass:
+    plan = plan_shaking(result, motion, **inputs)  # type: ignore[arg-type]
     return plan.gathered(run_blocks(work) for work in plan.work(chunk))
 
 
 def test_sliding_blocks_by_hand() -> None:
     # D = factor (A g T²/2) (A/k_y - 1) on a base of 20 degrees with 30 degrees of friction
-    made = classify_block()
+    result = classify_block()
     ky = math.tan(math.radians(10.0))
     factor = math.cos(math.radians(10.0)) / math.cos(math.radians(30.0))
     slid = factor * 0.5 * 0.4 * G * 0.2**2 * (0.4 / ky - 1.0)
     for limit, outcome in ((slid * 1.001, "stays"), (slid * 0.999, "fails")):
-        found = shake(made, pulse(0.4, 0.2), limits=FailureLimits(limit))
-        assert [OUTCOMES[code] for code in found.code[0]] == [outcome] * 3
-        assert found.displacement_m[0] == pytest.approx([slid] * 3, rel=1e-10)
-        assert np.isnan(found.rotation_rad).all()
-        (each,) = failures(found)
-        assert each.total.fails == (3 if outcome == "fails" else 0)
-        assert each.total.of_all.value == (1.0 if outcome == "fails" else 0.0)
-        assert each.modes["slide"].displacement_m is not None
-        assert each.modes["slide"].displacement_m["max"] == pytest.approx(slid, rel=1e-10)
+        answer = shake(result, pulse(0.4, 0.2), limits=FailureLimits(limit))
+        assert [OUTCOMES[code] for code in answer.code[0]] == [outcome] * 3
+        assert answer.displacement_m[0] == pytest.approx([slid] * 3, rel=1e-10)
+        assert np.isnan(answer.rotation_rad).all()
+        (separate,) = failures(answer)
+        assert separate.total.fails == (3 if outcome == "fails" else 0)
+        assert separate.total.of_all.value == (1.0 if outcome == "fails" else 0.0)
+        assert separate.modes["slide"].displacement_m is not None
+        assert separate.modes["slide"].displacement_m["max"] == pytest.approx(slid, rel=1e-10)
     # on the limit itself rounding decides, and that is said
-    at_limit = shake(made, pulse(0.4, 0.2), limits=FailureLimits(float(found.displacement_m[0, 0])))
+    at_limit = shake(
+        result, pulse(0.4, 0.2), limits=FailureLimits(float(answer.displacement_m[0, 0]))
+    )
     assert at_limit.code[0].tolist() == [OUTCOMES.index("undetermined")] * 3
     assert failures(at_limit)[0].total.open == 3
 
 
 def test_scales_are_factors_on_the_motion() -> None:
-    made = classify_block()
-    found = shake(made, pulse(0.4, 0.2), scales=[2.0, 0.4, 1.0, 0.4])
-    assert found.shaking.scales == (0.4, 1.0, 2.0)
-    assert found.pga_g.tolist() == pytest.approx([0.16, 0.4, 0.8])
+    result = classify_block()
+    answer = shake(result, pulse(0.4, 0.2), scales=[2.0, 0.4, 1.0, 0.4])
+    assert answer.shaking.scales == (0.4, 1.0, 2.0)
+    assert answer.pga_g.tolist() == pytest.approx([0.16, 0.4, 0.8])
     # k_y = 0.176 g is not passed at 0.16 g
-    assert found.code[0].tolist() == [OUTCOMES.index("at_rest")] * 3
-    assert found.displacement_m[0].tolist() == [0.0] * 3
-    assert found.runs == 6
-    for i, scale in enumerate(found.shaking.scales):
-        alone = shake(made, pulse(0.4 * scale, 0.2))
-        assert alone.displacement_m[0] == pytest.approx(found.displacement_m[i], rel=1e-12)
+    assert answer.code[0].tolist() == [OUTCOMES.index("at_rest")] * 3
+    assert answer.displacement_m[0].tolist() == [0.0] * 3
+    assert answer.runs == 6
+    for i, scale in enumerate(answer.shaking.scales):
+        alone = shake(result, pulse(0.4 * scale, 0.2))
+        assert alone.displacement_m[0] == pytest.approx(answer.displacement_m[i], rel=1e-12)
 
 
 def test_a_motion_below_every_threshold_needs_no_run() -> None:
-    made = FOUR_MODES.realise(200, 4)
-    k = made.stability.yield_acceleration
-    positive = k[made.is_block & (k > 0.0)]
-    plan = plan_shaking(made, pulse(0.999 * float(positive.min()), 5.0))
+    result = FOUR_MODES.realise(200, 4)
+    k = result.stability.yield_acceleration
+    positive = k[result.is_block & (k > 0.0)]
+    plan = plan_shaking(result, pulse(0.999 * float(positive.min()), 5.0))
     assert not plan.moves.any()
     assert list(plan.work()) == []
-    found = plan.gathered([])
-    assert found.runs == 0
-    assert failures(found)[0].total.fails == 0
+    answer = plan.gathered([])
+    assert answer.runs == 0
+    assert failures(answer)[0].total.fails == 0
 
 
 @pytest.fixture(scope="module")
@@ -129,7 +134,7 @@ def four() -> ShakenMass:
 def test_every_block_is_what_it_would_be_alone(water: dict[str, object]) -> None:
     mass = RockMass.of({**DESCRIPTION, **water}).realise(400, 2)
     shaken = shake(mass, record(), scales=[1.5])
-    found: set[tuple[str, str]] = set()
+    result: set[tuple[str, str]] = set()
     followed: Counter[str] = Counter()
     for j in np.flatnonzero(shaken.moves[0])[:150]:
         wet = {"water_m": float(mass.water_m[j]), "density_kg_m3": 2600.0} if water else {}
@@ -141,11 +146,11 @@ def test_every_block_is_what_it_would_be_alone(water: dict[str, object]) -> None
             **wet,
         )
         outcome = OUTCOMES[shaken.code[0, j]]
-        found.add((alone.kind, outcome))
+        result.add((alone.kind, outcome))
         followed[alone.kind] += bool(alone.mode_changes)
         if alone.kind != "sliding" or alone.outcome is not Outcome.STABLE:
-            told = {"stable": "stays", "toppled": "fails"}.get(alone.outcome, alone.outcome.value)
-            assert outcome == told
+            values = {"stable": "stays", "toppled": "fails"}.get(alone.outcome, alone.outcome.value)
+            assert outcome == values
         elif outcome != "undetermined":
             assert (outcome == "fails") == (alone.peak_displacement_m > 0.05)
         assert alone.final_mode == MODES[shaken.final_code[0, j]]
@@ -155,29 +160,29 @@ def test_every_block_is_what_it_would_be_alone(water: dict[str, object]) -> None
         ):
             # to the last bit, also where it is followed step by step
             assert many[0, j] == peak or (peak is None and np.isnan(many[0, j]))
-    assert {kind for kind, _ in found} == {
+    assert {kind for kind, _ in result} == {
         "sliding", "toppling", "slumping", "confined_toppling",
     }  # fmt: skip
-    assert {"stays", "fails"} <= {outcome for _, outcome in found}
+    assert {"stays", "fails"} <= {outcome for _, outcome in result}
     # slides that tip back, topples whose toe slips, slumps that lose a contact
     assert min(followed[kind] for kind in ("sliding", "toppling", "slumping")) > 0
 
 
 def test_the_fates_are_a_partition(four: ShakenMass) -> None:
-    made = four.realisations
-    for i, each in enumerate(failures(four)):
-        assert each.total.count == made.n_blocks < made.n
-        assert sum(found.count for found in each.modes.values()) == made.n_blocks
-        for found in (*each.modes.values(), each.total):
-            assert sum(found.outcomes.values()) == found.count
-            assert found.open == sum(found.outcomes[name] for name in OPEN)
-            assert found.of_all.low <= found.of_all.value <= found.of_all.high
-            assert found.of_all.value == found.fails / made.n_blocks
-        unstable = made.is_block & (made.stability.state == "unstable")
-        assert each.total.outcomes["unstable"] == int(unstable.sum()) > 0
-        assert each.total.outcomes["locked"] == int((made.stability.state == "locked").sum()) > 0
-        assert each.total.moved == int(four.moves[i].sum())
-        assert set(four.code[i, ~made.is_block].tolist()) == {-1}
+    result = four.realisations
+    for i, item in enumerate(failures(four)):
+        assert item.total.count == result.n_blocks < result.n
+        assert sum(answer.count for answer in item.modes.values()) == result.n_blocks
+        for answer in (*item.modes.values(), item.total):
+            assert sum(answer.outcomes.values()) == answer.count
+            assert answer.open == sum(answer.outcomes[name] for name in OPEN)
+            assert answer.of_all.low <= answer.of_all.value <= answer.of_all.high
+            assert answer.of_all.value == answer.fails / result.n_blocks
+        unstable = result.is_block & (result.stability.state == "unstable")
+        assert item.total.outcomes["unstable"] == int(unstable.sum()) > 0
+        assert item.total.outcomes["locked"] == int((result.stability.state == "locked").sum()) > 0
+        assert item.total.moved == int(four.moves[i].sum())
+        assert set(four.code[i, ~result.is_block].tolist()) == {-1}
     assert four.runs == int(four.moves.sum())
 
 
@@ -202,8 +207,8 @@ def test_a_stated_rotation_is_failure_before_recovery_is_lost(four: ShakenMass) 
     assert (now[slumps & turned] == fails).all()
     assert (lax[slumps & turned] != fails).any()
     # what a free topple or a slide does is judged as before
-    others = ~slumps & (four.realisations.stability.mode != "confined_topple")
-    assert np.array_equal(now[others], lax[others])
+    rest = ~slumps & (four.realisations.stability.mode != "confined_topple")
+    assert np.array_equal(now[rest], lax[rest])
 
 
 def test_thrown_off_by_the_vertical_motion() -> None:
@@ -238,16 +243,16 @@ def test_the_table_has_a_row_for_each_block_and_scale(four: ShakenMass) -> None:
 
 
 @pytest.mark.parametrize(
-    ("asked", "word"),
+    ("inputs", "word"),
     [
         ({"scales": [1.0, 0.0]}, "scale 0"),
         ({"scales": [math.nan]}, "scale nan"),
         ({"scales": []}, "no scale"),
     ],
 )
-def test_rejected(asked: dict[str, object], word: str) -> None:
+def test_rejected(inputs: dict[str, object], word: str) -> None:
     with pytest.raises(InputError, match=word):
-        plan_shaking(classify_block(), pulse(0.4, 0.2), **asked)  # type: ignore[arg-type]
+        plan_shaking(classify_block(), pulse(0.4, 0.2), **inputs)  # type: ignore[arg-type]
 
 
 def test_more_than_the_memory_holds_is_rejected(monkeypatch: pytest.MonkeyPatch) -> None:

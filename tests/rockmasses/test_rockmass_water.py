@@ -6,11 +6,16 @@ import numpy as np
 import pytest
 
 from rbfrag import Block, GroundMotion, InputError, predict, respond, stability
-from rbfrag.campaign.shake_rockmass import shake
+from rbfrag.campaign.rock_mass_answer import shake
 from rbfrag.rockmasses.counts import mode_counts
-from rbfrag.rockmasses.failures import final_modes, outcome_columns
 from rbfrag.rockmasses.joint_sets import Realisations, RockMass
-from rbfrag.rockmasses.report import as_dict, block_columns, toppling_blocks
+from rbfrag.rockmasses.report import (
+    as_dict,
+    block_columns,
+    final_modes,
+    outcome_columns,
+    toppling_blocks,
+)
 from rbfrag.rockmasses.scenario import ENDS, SLIPS_ON, Scenario, scenario
 from rbfrag.rockmasses.shaking import BOND_BREAKS, FAILS, OUTCOMES, ShakenMass, plan_shaking
 from rbfrag.solver.stability.joint import ASSUMED_DENSITY, IS_DRAINED, STAYS_UNDRAINED
@@ -32,9 +37,9 @@ PUSH = GroundMotion(np.array([0.0, 0.5, 0.0]), 0.2)
     ("description", "mode", "k"), [(WET_SLIDE, "slide", 0.21820), (WET_TOPPLE, "topple", 0.23800)]
 )
 def test_printed_yields(description: dict[str, object], mode: str, k: float) -> None:
-    one = RockMass.of(description).realise(1, 1)
-    assert one.stability.mode[0] == mode
-    assert one.stability.yield_acceleration[0] == pytest.approx(k, abs=6e-6)
+    single = RockMass.of(description).realise(1, 1)
+    assert single.stability.mode[0] == mode
+    assert single.stability.yield_acceleration[0] == pytest.approx(k, abs=6e-6)
     full = RockMass.of({**description, "back.water_m": 50.0}).realise(1, 1)
     fills = {"slide": 2.2743, "topple": 3.0347}[mode]
     assert full.water_m[0] == pytest.approx(fills, abs=6e-5)
@@ -49,13 +54,13 @@ def test_each_block_yields_as_it_would_alone() -> None:
     assert many.is_block.all()
     assert many.water_m.std() > 0.2
     for i in range(100):
-        one = stability(
+        single = stability(
             Block.from_fractures(2.0, 3.0, 60.0), beta_deg=20.0, phi_deg=38.0,
             water_m=many.water_m[i], jrc=many.jrc[i], jcs_mpa=60.0, density_kg_m3=2650.0,
         )  # fmt: skip
-        assert many.stability.mode[i] == one.mode
+        assert many.stability.mode[i] == single.mode
         assert many.stability.yield_acceleration[i] == pytest.approx(
-            one.yield_acceleration, rel=1e-12
+            single.yield_acceleration, rel=1e-12
         )
     assert {"water_m", "jrc"} <= block_columns(many).keys()
 
@@ -73,13 +78,13 @@ DRAINED: dict[str, object] = {"back.drainage": "drained"}
 SHAKING = {"pgv_m_s": 0.6, "pga_g": 0.7}
 
 
-def asked(description: dict[str, object], n: int = 400) -> tuple[Realisations, Scenario]:
+def assess_masses(description: dict[str, object], n: int = 400) -> tuple[Realisations, Scenario]:
     blocks = RockMass.of(description).realise(n, 2)
     return blocks, scenario(blocks, SHAKING, displacement_m=0.05)
 
 
 def test_each_wet_block_has_the_probability_it_would_have_alone() -> None:
-    blocks, answer = asked({**FOUR_MODES, **WATER})
+    blocks, answer = assess_masses({**FOUR_MODES, **WATER})
     stable = blocks.is_block & (blocks.stability.state_code == STABLE) & (answer.how != "")
     modes = set()
     assert answer.drained is not None
@@ -93,9 +98,9 @@ def test_each_wet_block_has_the_probability_it_would_have_alone() -> None:
             }  # fmt: skip
             if drainage == "undrained":
                 shape["water_m"] = float(blocks.water_m[i])
-            own = blocks if drainage == "undrained" else blocks.drained
-            assert own is not None
-            if own.stability.mode[i] == "slide":
+            expected = blocks if drainage == "undrained" else blocks.drained
+            assert expected is not None
+            if expected.stability.mode[i] == "slide":
                 shape["displacement_m"] = 0.05
             elif np.isnan(many.probability[i]):
                 continue
@@ -122,12 +127,12 @@ def test_a_wet_slide_is_as_likely_as_elsewhere() -> None:
 
 @pytest.fixture(scope="module")
 def dry() -> tuple[Realisations, Scenario, ShakenMass]:
-    blocks, answer = asked(FOUR_MODES)
+    blocks, answer = assess_masses(FOUR_MODES)
     return blocks, answer, shake(blocks, PUSH, jobs=1)
 
 
 def test_a_drained_rock_mass_is_a_dry_one(dry: tuple[Realisations, Scenario, ShakenMass]) -> None:
-    drained, answer = asked({**FOUR_MODES, **WATER, **DRAINED})
+    drained, answer = assess_masses({**FOUR_MODES, **WATER, **DRAINED})
     assert drained.water_m.any()
     assert drained.drained is not None
     assert np.array_equal(
@@ -151,7 +156,7 @@ def test_a_drained_rock_mass_is_a_dry_one(dry: tuple[Realisations, Scenario, Sha
 def test_water_that_vanishes_leaves_a_dry_rock_mass(
     dry: tuple[Realisations, Scenario, ShakenMass],
 ) -> None:
-    wet, answer = asked({**FOUR_MODES, "back.water_m": 1e-9})
+    wet, answer = assess_masses({**FOUR_MODES, "back.water_m": 1e-9})
     assert wet.is_wet.any()
     assert np.array_equal(wet.stability.mode_code, dry[0].stability.mode_code)
     assert answer.probability == pytest.approx(dry[1].probability, abs=1e-7, nan_ok=True)
@@ -162,13 +167,13 @@ def test_water_that_vanishes_leaves_a_dry_rock_mass(
 
 
 def test_drained_is_the_lower_bound() -> None:
-    blocks, answer = asked({**FOUR_MODES, **WATER})
+    blocks, answer = assess_masses({**FOUR_MODES, **WATER})
     assert blocks.drained is not None
     assert answer.drained is not None
     same_mode = blocks.stability.mode_code == blocks.drained.stability.mode_code
-    known = same_mode & np.isfinite(answer.probability) & np.isfinite(answer.drained.probability)
-    assert np.all(answer.probability[known] >= answer.drained.probability[known] - 1e-12)
-    assert known.sum() > 200
+    expected = same_mode & np.isfinite(answer.probability) & np.isfinite(answer.drained.probability)
+    assert np.all(answer.probability[expected] >= answer.drained.probability[expected] - 1e-12)
+    assert expected.sum() > 200
     assert answer.covered.probability > answer.drained.covered.probability  # type: ignore[operator]
     columns = block_columns(blocks, answer)
     assert np.array_equal(
@@ -203,10 +208,10 @@ def test_water_stays_on_residual_friction() -> None:
     slips = RockMass.of({**WET_SLIDE, "friction.phi_deg": 30.0}).realise(4, 1)
     assert wet.stability.yield_acceleration[0] == pytest.approx(0.21820, abs=6e-6)
     measures = {"pgv_m_s": 0.6, "pga_g": 0.5}
-    answers = [scenario(each, measures, displacement_m=0.05) for each in (wet, slips)]
+    answers = [scenario(item, measures, displacement_m=0.05) for item in (wet, slips)]
     assert np.array_equal(answers[0].probability, answers[1].probability)
     assert np.isfinite(answers[0].probability).all()
-    shaken = [shake(each, PUSH, jobs=1) for each in (wet, slips)]
+    shaken = [shake(item, PUSH, jobs=1) for item in (wet, slips)]
     assert np.array_equal(shaken[0].displacement_m, shaken[1].displacement_m)
     assert final_modes(shaken[0], 0)["slide"]["slide"] == 4
     alone = respond(
@@ -221,11 +226,11 @@ def test_water_stays_on_residual_friction() -> None:
 
 
 def test_a_density_that_is_not_given_is_assumed() -> None:
-    stated = {k: v for k, v in WET_SLIDE.items() if k != "block.density_kg_m3"}
-    assumed, given = RockMass.of(stated), RockMass.of(WET_SLIDE)
+    value = {k: v for k, v in WET_SLIDE.items() if k != "block.density_kg_m3"}
+    assumed, inputs = RockMass.of(value), RockMass.of(WET_SLIDE)
     assert assumed.remarks == (ASSUMED_DENSITY,)
-    assert given.remarks == ()
-    assert assumed.realise(1, 1).stability.ky == given.realise(1, 1).stability.ky
+    assert inputs.remarks == ()
+    assert assumed.realise(1, 1).stability.ky == inputs.realise(1, 1).stability.ky
 
 
 def test_the_water_of_a_vertical_acceleration_leaves_the_yield_at_rest() -> None:

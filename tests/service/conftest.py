@@ -21,5 +21,5 @@ def database(tmp_path: Path) -> Path:
 def client(database: Path) -> Iterator[TestClient]:
     with TestClient(
         make_app(ServiceSettings(db=str(database))), raise_server_exceptions=False
-    ) as found:
-        yield found
+    ) as result:
+        yield result

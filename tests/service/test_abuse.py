@@ -22,8 +22,8 @@ BODY_TIME_S = 2.0
 @pytest.fixture(scope="module")
 def service(tmp_path_factory):
     folder = tmp_path_factory.mktemp("service")
-    told = {"body_limit_mb": LIMIT / 1e6, "body_time": BODY_TIME_S, "time_limit": 120.0}
-    with running_service(folder, **told) as running:
+    values = {"body_limit_mb": LIMIT / 1e6, "body_time": BODY_TIME_S, "time_limit": 120.0}
+    with running_service(folder, **values) as running:
         # the first answer waits until the kernels are there
         assert ask(running, "POST", "/v1/spectrum?p2=3", RECORD.encode())[0] == 200
         yield running
@@ -48,11 +48,11 @@ def stays_up(service):
     assert status == 200, text
 
 
-def rejected(found, status):
-    assert found[0] == status, found
-    problem = json.loads(found[1])
+def rejected(result, status):
+    assert result[0] == status, result
+    problem = json.loads(result[1])
     assert problem["status"] == status
-    assert "Traceback" not in found[1]
+    assert "Traceback" not in result[1]
     return problem["detail"]
 
 
@@ -168,8 +168,8 @@ def test_what_is_not_json_is_rejected(service, body, words):
     ids=["largest", "nested", "text", "truth", "huge", "lengths", "name"],
 )
 def test_values_of_any_kind_are_answered(service, body, words):
-    found = ask(service, "POST", "/v1/predict", json.dumps(body).encode())
-    assert words in rejected(found, 422)
+    result = ask(service, "POST", "/v1/predict", json.dumps(body).encode())
+    assert words in rejected(result, 422)
 
 
 @pytest.mark.parametrize("value", ["nan", "inf", "-inf", "1e999", "1e-999", "-0", "0x10", "١"])
@@ -265,7 +265,7 @@ def test_two_hundred_uploads_at_once_are_answered(service):
 
     start = time.monotonic()
     with ThreadPoolExecutor(200) as pool:
-        found = list(pool.map(send, range(200)))
-    assert set(found) <= {200, 503}
-    assert found.count(200) > 50
+        values = list(pool.map(send, range(200)))
+    assert set(values) <= {200, 503}
+    assert values.count(200) > 50
     assert time.monotonic() - start < 150

@@ -38,7 +38,7 @@ def test_health(client):
 
 def test_the_vocabulary_is_served(client):
     document = client.get("/v1/vocabulary").json()
-    quantities = {each["name"]: each for each in document["quantities"]}
+    quantities = {quantity["name"]: quantity for quantity in document["quantities"]}
     assert {*quantities} == {*QUANTITIES}
     pgv = quantities["pgv_m_s"]
     about = QUANTITIES["pgv_m_s"]

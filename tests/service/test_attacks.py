@@ -15,7 +15,7 @@ import pytest
 from benchmarks.running_service import running_service
 from rbfrag.service.work import EXAMPLE as RECORD
 
-ONE = "/v1/predict?p2=3&kr=0.1&pgv=0.6"
+SINGLE = "/v1/predict?p2=3&kr=0.1&pgv=0.6"
 BODY = b'{"p2": 3, "kr": 0.1, "pgv": 0.6}'
 TIME_LIMIT_S = 6.0
 CLIENT_WAITS_S = 2.0
@@ -26,7 +26,7 @@ CLIENT_WAITS_S = 2.0
 def service(tmp_path_factory):
     folder = tmp_path_factory.mktemp("service")
     with running_service(folder, time_limit=TIME_LIMIT_S) as running:
-        assert ask(running, "GET", ONE)[0] == 200
+        assert ask(running, "GET", SINGLE)[0] == 200
         # the processes for long work load their kernels first, on a busy machine beyond the limit
         end = time.monotonic() + 300.0
         while ask(running, "POST", "/v1/spectrum?p2=3", RECORD.encode())[0] != 200:
@@ -43,10 +43,10 @@ def ask(running, method, path, body=None, headers=None, timeout=60.0):
 
 
 @contextmanager
-def going_on(attack, *given):
+def going_on(attack, *inputs):
     """Run an attack in a thread beside the block; yields a list for its result."""
     result = []
-    thread = threading.Thread(target=lambda: result.append(attack(*given)))
+    thread = threading.Thread(target=lambda: result.append(attack(*inputs)))
     thread.start()
     try:
         yield result
@@ -65,15 +65,15 @@ def test_a_locked_file_holds_nobody_else(service):
         other.execute("PRAGMA journal_mode = DELETE")
         other.execute("BEGIN EXCLUSIVE")
         os.utime(place)  # the models are to be read again
-        with going_on(ask, service, "GET", ONE) as found:
+        with going_on(ask, service, "GET", SINGLE) as result:
             for _ in range(10):
                 healthy(service)
                 time.sleep(0.1)
-            assert not found  # it still waits for the lock
+            assert not result  # it still waits for the lock
         other.execute("ROLLBACK")
-    status, _, text = found[0]
+    status, _, text = result[0]
     assert (status, json.loads(text)["status"]) == (503, 503)
-    assert ask(service, "GET", ONE)[0] == 200
+    assert ask(service, "GET", SINGLE)[0] == 200
 
 
 @pytest.mark.parametrize(
@@ -87,22 +87,22 @@ def test_a_locked_file_holds_nobody_else(service):
     ids=["deep", "many", "long", "names"],
 )
 def test_a_large_body_is_rejected_before_it_is_parsed(service, body):
-    with going_on(ask, service, "POST", "/v1/predict", body) as found:
+    with going_on(ask, service, "POST", "/v1/predict", body) as result:
         for _ in range(10):
             healthy(service)
-    assert found[0][0] in (400, 422)
+    assert result[0][0] in (400, 422)
 
 
 def test_a_million_elements_are_parsed_beside_others(service):
     body = b'{"kr": 0.1, "pgv": 0.6, "p2": [' + b"3.0," * 3_000_000 + b"3.0]}"
-    with going_on(ask, service, "POST", "/v1/predict", body) as found:
+    with going_on(ask, service, "POST", "/v1/predict", body) as result:
         for _ in range(20):
             healthy(service)
-    assert found[0][0] == 422  # too many for a list, or for the time of one request
+    assert result[0][0] == 422  # too many for a list, or for the time of one request
 
 
 @pytest.mark.parametrize(
-    ("stated", "sent", "honest"),
+    ("value", "sent", "honest"),
     [
         (1000, 0, BODY),
         (100_000, 0, b" " * 80_000 + BODY),
@@ -110,13 +110,13 @@ def test_a_million_elements_are_parsed_beside_others(service):
         (128_000, 66_000, b" " * 240_000 + BODY),
     ],
 )
-def test_idle_bodies_keep_nobody_out(service, stated, sent, honest):
+def test_idle_bodies_keep_nobody_out(service, value, sent, honest):
     wires = [socket.create_connection(("127.0.0.1", service.port), 60) for _ in range(40)]
     try:
         for wire in wires:
             wire.sendall(
                 b"POST /v1/predict HTTP/1.1\r\nhost: localhost\r\n"
-                b"content-length: %d\r\n\r\n" % stated + b" " * sent
+                b"content-length: %d\r\n\r\n" % value + b" " * sent
             )
         time.sleep(0.5)  # until what was sent is read
         healthy(service)
@@ -188,7 +188,7 @@ def test_dotted_keys_burn_no_worker(service):
     assert "more than 20 parts" in json.loads(text)["detail"]
 
 
-@pytest.mark.parametrize("path", ["/v1/healthz", "/v1/models", ONE])
+@pytest.mark.parametrize("path", ["/v1/healthz", "/v1/models", SINGLE])
 def test_head_is_answered_as_get(service, path):
     got, head = ask(service, "GET", path), ask(service, "HEAD", path)
     assert head[0] == got[0] == 200
@@ -249,7 +249,7 @@ def test_a_rejected_upload_is_told_why(service):
 def test_a_foreign_page_may_not_send(service, origin, status):
     headers = {} if origin is None else {"origin": origin.format(port=service.port)}
     assert ask(service, "POST", "/v1/predict", BODY, headers)[0] == status
-    assert ask(service, "GET", ONE, None, headers)[0] == 200
+    assert ask(service, "GET", SINGLE, None, headers)[0] == 200
 
 
 def test_a_page_that_is_allowed_may_send(tmp_path):
@@ -263,9 +263,11 @@ def test_the_scheme_of_the_token_is_written_in_any_case(tmp_path):
     token = "t" * 20
     with running_service(tmp_path, environment={"RBFRAG_TOKEN": token}) as running:
         for scheme in ("Bearer", "bearer", "BEARER"):
-            assert ask(running, "GET", ONE, None, {"authorization": f"{scheme} {token}"})[0] == 200
+            assert (
+                ask(running, "GET", SINGLE, None, {"authorization": f"{scheme} {token}"})[0] == 200
+            )
         for wrong in (f"Basic {token}", f"Bearer {token}x", token, "Bearer"):
-            assert ask(running, "GET", ONE, None, {"authorization": wrong})[0] == 401
+            assert ask(running, "GET", SINGLE, None, {"authorization": wrong})[0] == 401
 
 
 def test_a_locked_table_of_a_server_ends_with_the_time_limit(place, tmp_path):
@@ -287,14 +289,14 @@ def test_a_locked_table_of_a_server_ends_with_the_time_limit(place, tmp_path):
         psycopg.connect(place) as other,
     ):
         end = time.monotonic() + 300.0  # the first answer loads the libraries of a server
-        while ask(running, "GET", ONE)[0] != 200:
+        while ask(running, "GET", SINGLE)[0] != 200:
             assert time.monotonic() < end
         other.execute("LOCK TABLE fragility_model IN ACCESS EXCLUSIVE MODE")
-        with going_on(ask, running, "GET", ONE) as found:
+        with going_on(ask, running, "GET", SINGLE) as result:
             for _ in range(10):
                 healthy(running)
                 time.sleep(0.1)
         # the lock is still held: the answer came by the limit of time
-        assert found[0][0] == 503
+        assert result[0][0] == 503
         other.rollback()
-        assert ask(running, "GET", ONE)[0] == 200
+        assert ask(running, "GET", SINGLE)[0] == 200

@@ -29,12 +29,12 @@ def numbers_of(shape):
 )
 def test_a_shape_is_answered_as_its_numbers(client, shape):
     p2, kr = numbers_of(shape)
-    found = client.get("/v1/predict", params={**shape, "pgv": 0.6}).json()
+    result = client.get("/v1/predict", params={**shape, "pgv": 0.6}).json()
     same = client.get("/v1/predict", params={"p2": p2, "kr": kr, "pgv": 0.6}).json()
     for name in ("kind", "model"):
-        assert found[name] == same[name]
+        assert result[name] == same[name]
     for name in ("probability", "ci_low", "ci_high", "y_m_s"):
-        assert found[name] == pytest.approx(same[name], rel=1e-9)
+        assert result[name] == pytest.approx(same[name], rel=1e-9)
 
 
 def test_a_rectangle_without_friction_is_taken_to_topple_and_says_so(client):
@@ -48,12 +48,12 @@ def test_a_rectangle_without_friction_is_taken_to_topple_and_says_so(client):
 
 def test_a_list_of_rectangles_is_answered_as_each_of_them(client):
     body = {"height": [2.0, 3.0, None], "width": 0.5, "dip": [3.0, 0.0, 0.0], "pgv": 0.6}
-    found = client.post("/v1/predict", json=body).json()
+    result = client.post("/v1/predict", json=body).json()
     for i in range(2):
         query = {"height": body["height"][i], "width": 0.5, "dip": body["dip"][i], "pgv": 0.6}
-        one = client.get("/v1/predict", params={**query, "model": found["model"]}).json()
-        assert found["probability"][i] == pytest.approx(one["probability"], rel=1e-12)
-    assert found["probability"][2] is None
+        single = client.get("/v1/predict", params={**query, "model": result["model"]}).json()
+        assert result["probability"][i] == pytest.approx(single["probability"], rel=1e-12)
+    assert result["probability"][2] is None
 
 
 def test_a_shape_that_slides_is_answered_where_sliding_is_asked_for(client):
@@ -103,8 +103,8 @@ def test_a_list_of_what_is_no_rectangle_is_rejected(client, body, words):
 
 def test_block_and_drawing_take_a_rectangle(client):
     query = {**RECTANGLE, "phi": 40}
-    found = client.get("/v1/block", params=query).json()
-    assert (found["p2"], found["kr"]) == pytest.approx(numbers_of(RECTANGLE), rel=1e-9)
+    result = client.get("/v1/block", params=query).json()
+    assert (result["p2"], result["kr"]) == pytest.approx(numbers_of(RECTANGLE), rel=1e-9)
     drawn = client.get("/v1/drawing", params=query).json()["block"]
     assert drawn.pop("text")["sentences"]
-    assert drawn == found
+    assert drawn == result

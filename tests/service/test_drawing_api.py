@@ -1,8 +1,8 @@
-"""What the page draws of a block."""
+"""Drawing of a block on the page."""
 
 import pytest
 
-from rbfrag.plots.blocks.block import block_lines
+from rbfrag.plots.block import block_lines
 from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.stability.single import stability
 
@@ -22,8 +22,8 @@ def test_a_shape_is_drawn_on_its_planes(client):
 
 def test_two_numbers_are_drawn_as_a_rectangle(client):
     answer = client.get("/v1/drawing", params={"p2": 3, "kr": 0.1}).json()
-    (left, _), (right, bottom), (_, top), _ = answer["outline_m"]
-    assert (right - left) / (top - bottom) == pytest.approx(0.1)
+    (remaining, _), (right, bottom), (_, top), _ = answer["outline_m"]
+    assert (right - remaining) / (top - bottom) == pytest.approx(0.1)
     assert answer["rectangle_r3_m"] == pytest.approx(answer["block"]["r3_m"])
     assert (answer["kind"], answer["numbers"]) == ("toppling", {"p2": 3.0, "kr": 0.1})
 
@@ -42,10 +42,10 @@ def test_what_predictions_read_of_a_block_comes_with_its_drawing(client, query, 
     assert answer["kind"] == kind
     assert answer["numbers"] is None if names is None else set(answer["numbers"]) >= names
     if names == {"p2", "kr"}:
-        asked = {**answer["numbers"], "kind": kind, "pgv": 0.6}
+        inputs = {**answer["numbers"], "kind": kind, "pgv": 0.6}
         shape = {**query, "kind": kind, "pgv": 0.6}
         by_numbers, by_shape = (
-            client.get("/v1/predict", params=each).json()["probability"] for each in (asked, shape)
+            client.get("/v1/predict", params=item).json()["probability"] for item in (inputs, shape)
         )
         assert by_numbers == by_shape
 

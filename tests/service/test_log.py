@@ -8,7 +8,7 @@ import sys
 
 PROGRAM = """
 import warnings
-from rbfrag.service.request_records import log_as_json
+from rbfrag.service.guard import log_as_json
 
 log_as_json()
 warnings.warn("overflow encountered", RuntimeWarning)
@@ -16,7 +16,7 @@ warnings.warn("overflow encountered", RuntimeWarning)
 
 
 def test_a_warning_is_a_line_of_json() -> None:
-    done = subprocess.run([sys.executable, "-c", PROGRAM], capture_output=True, text=True)
-    (line,) = done.stderr.splitlines()
+    process = subprocess.run([sys.executable, "-c", PROGRAM], capture_output=True, text=True)
+    (line,) = process.stderr.splitlines()
     assert json.loads(line)["level"] == "warning"
     assert "overflow encountered" in json.loads(line)["message"]

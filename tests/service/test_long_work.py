@@ -7,13 +7,13 @@ import pytest
 from fastapi.testclient import TestClient
 
 from rbfrag.db.location import REFERENCE
-from rbfrag.motions.export import export_motions
 from rbfrag.motions.ground_motion import GroundMotion
+from rbfrag.motions.readers import export_motions
 from rbfrag.service.app import make_app
+from rbfrag.service.operations import CURVE
+from rbfrag.service.operations import ROCK_MASS as TABLES
+from rbfrag.service.operations import ROCK_MASS_TOML as EXAMPLE_TOML
 from rbfrag.service.settings import ServiceSettings
-from rbfrag.service.uploads import CURVE
-from rbfrag.service.uploads import ROCK_MASS as TABLES
-from rbfrag.service.uploads import ROCK_MASS_TOML as EXAMPLE_TOML
 from rbfrag.service.work import EXAMPLE as RECORD
 from rbfrag.solver.block.geometry import Block
 from tests.cli.conftest import Shell
@@ -23,9 +23,9 @@ TOML = {"content-type": "application/toml"}
 
 def document(answer):
     """Return a document without its diagnostics, as `Shell.json` does."""
-    found = answer.json()
-    del found["diagnostics"]
-    return found
+    reply = answer.json()
+    del reply["diagnostics"]
+    return reply
 
 
 @pytest.fixture(scope="module")
@@ -33,8 +33,8 @@ def client():
     """One service for all: its processes take a while to start."""
     # its process may have to compile the kernels first, on a busy machine
     settings = ServiceSettings(db=str(REFERENCE), row_limit=6000, jobs=1, time_limit=300.0)
-    with TestClient(make_app(settings)) as found:
-        yield found
+    with TestClient(make_app(settings)) as result:
+        yield result
 
 
 @pytest.fixture
@@ -98,13 +98,17 @@ def test_a_spectrum_is_answered_as_by_the_command_line(client, written, shell: S
         client.post(query, content=RECORD),
         client.post(query, files={"file": ("../../etc/passwd", RECORD)}),
     ):
-        found = answer.json()
-        for one, other in zip(
-            *([each] if isinstance(each, dict) else each for each in (found, printed)), strict=True
+        document = answer.json()
+        for item, other in zip(
+            *(
+                [element] if isinstance(element, dict) else element
+                for element in (document, printed)
+            ),
+            strict=True,
         ):
-            del one["diagnostics"]
+            del item["diagnostics"]
             # the command line names the file that was given; here there is none
-            assert {**other, "motion": "upload", "name": "upload"} == one
+            assert {**other, "motion": "upload", "name": "upload"} == item
 
 
 def test_the_critical_block_is_answered_as_by_the_command_line(client, written, shell: Shell):
@@ -115,12 +119,12 @@ def test_the_critical_block_is_answered_as_by_the_command_line(client, written, 
 
 def test_a_rectangle_is_searched_and_rated_by_its_numbers(client):
     sides, block = "height=2&width=0.5", Block.rectangle(2.0, 0.5)
-    found = client.post(f"/v1/critical?{sides}", content=RECORD).json()
-    assert found == client.post(f"/v1/critical?p2={block.p2!r}", content=RECORD).json()
-    found = client.post(f"/v1/hazard?{sides}", content=CURVE).json()
+    result = client.post(f"/v1/critical?{sides}", content=RECORD).json()
+    assert result == client.post(f"/v1/critical?p2={block.p2!r}", content=RECORD).json()
+    result = client.post(f"/v1/hazard?{sides}", content=CURVE).json()
     same = client.post(f"/v1/hazard?p2={block.p2!r}&kr=0.25", content=CURVE).json()
-    assert "assumed to topple" in found["warnings"][0]
-    assert found["annual_rate"] == pytest.approx(same["annual_rate"], rel=1e-9)
+    assert "assumed to topple" in result["warnings"][0]
+    assert result["annual_rate"] == pytest.approx(same["annual_rate"], rel=1e-9)
 
 
 def test_an_annual_rate_is_answered_as_by_the_command_line(client, written, shell: Shell):
@@ -141,8 +145,8 @@ def test_one_trace_of_several_is_asked_for_by_its_number(client, tmp_path):
     assert "holds 2 traces: give one of  0 (N), 1 (E)" in rejection(rejected)
     assert rejected.json()["traces"] == ["N", "E"]
     for i, motion in enumerate(motions):
-        found = client.post(f"/v1/spectrum?trace={i}", content=body).json()
-        assert found["pgv_m_s"] == motion.pgv_m_s
+        result = client.post(f"/v1/spectrum?trace={i}", content=body).json()
+        assert result["pgv_m_s"] == motion.pgv_m_s
 
 
 @pytest.mark.parametrize(
@@ -197,13 +201,15 @@ def test_more_rows_than_the_limit_are_rejected(client):
 
 
 def test_hazard_answers_for_free_standing_blocks(client):
-    free = "component=single&kind=rocking"
+    free_standing = "component=single&kind=rocking"
     backed = client.post("/v1/hazard?p2=7&kr=0.2&component=single", content=CURVE).json()
-    own = client.post(f"/v1/hazard?p2=7&kr=0.2&{free}", content=CURVE).json()
-    loses = client.post(f"/v1/hazard?p2=7&kr=0.2&restitution=0.8&{free}", content=CURVE).json()
-    assert own["model"].startswith("rocking")
-    assert backed["annual_rate"] < loses["annual_rate"] < own["annual_rate"]
-    sides = client.post(f"/v1/hazard?height=2&width=0.5&{free}", content=CURVE).json()
+    expected = client.post(f"/v1/hazard?p2=7&kr=0.2&{free_standing}", content=CURVE).json()
+    loses = client.post(
+        f"/v1/hazard?p2=7&kr=0.2&restitution=0.8&{free_standing}", content=CURVE
+    ).json()
+    assert expected["model"].startswith("rocking")
+    assert backed["annual_rate"] < loses["annual_rate"] < expected["annual_rate"]
+    sides = client.post(f"/v1/hazard?height=2&width=0.5&{free_standing}", content=CURVE).json()
     assert sides["annual_rate"] > 0.0
-    wrong = client.post(f"/v1/hazard?p2=7&kr=0.2&restitution=1.5&{free}", content=CURVE)
+    wrong = client.post(f"/v1/hazard?p2=7&kr=0.2&restitution=1.5&{free_standing}", content=CURVE)
     assert wrong.status_code == 422

@@ -10,8 +10,8 @@ def document(client):
 
 
 def test_every_operation_has_words_and_problems(client):
-    found = document(client)
-    assert set(found["paths"]) >= {
+    reply = document(client)
+    assert set(reply["paths"]) >= {
         "/v1/predict",
         "/v1/block",
         "/v1/rockmass",
@@ -22,7 +22,7 @@ def test_every_operation_has_words_and_problems(client):
         "/v1/vocabulary",
         "/v1/healthz",
     }
-    for path, operations in found["paths"].items():
+    for path, operations in reply["paths"].items():
         for operation in operations.values():
             assert operation["summary"]
             for parameter in operation.get("parameters", ()):
@@ -36,11 +36,11 @@ SENT = {"400", "401", "408", "413", "415", "422", "503"}
 
 
 def test_every_operation_documents_its_errors(client):
-    found = document(client)
-    assert not [name for name in found["components"]["schemas"] if "ValidationError" in name]
-    for path, operations in found["paths"].items():
+    answer = document(client)
+    assert not [name for name in answer["components"]["schemas"] if "ValidationError" in name]
+    for path, operations in answer["paths"].items():
         for method, operation in operations.items():
-            problems = {each for each in operation["responses"] if each != "200"}
+            problems = {response for response in operation["responses"] if response != "200"}
             if path in ("/v1/healthz", "/v1/vocabulary"):
                 assert not problems
             elif path == "/v1/models":
@@ -59,8 +59,8 @@ NO_UNIT = {"form", "sheet", "ignore_columns", "drainage", "name",
     "component", "convert", "convert_sigma", "imt", "jrc", "kct", "kct_sigma", "kind", "kr",
     "kr_sigma", "ks", "ks_sigma", "ky", "ky_sigma", "level", "magnitude", "map", "model", "n",
     "no_back", "p2_sigma", "pct2_sigma", "polarity", "ps2_sigma", "restitution",
-    "restitution_sigma", "reverse", "seed", "site", "sites", "text", "trace",
-    "units",
+    "restitution_sigma", "reverse", "seed", "sensitivity", "site", "sites", "solve_for",
+    "target_probability", "text", "trace", "units",
 }  # fmt: skip
 
 

@@ -12,14 +12,14 @@ from rbfrag.vocabulary.quantities import INPUTS, OTHER_WORDS, parameter_of
 SOURCES = sorted(
     path for path in FOLDER.rglob("*.*") if path.suffix in (".html", ".js", ".css", ".svg")
 )
-OWN = [path for path in SOURCES if "vendor" not in path.parts]
-MODULES = [path for path in OWN if path.suffix == ".js"]
+EXPECTED = [path for path in SOURCES if "vendor" not in path.parts]
+MODULES = [path for path in EXPECTED if path.suffix == ".js"]
 
 SVG_NAMESPACE = "http://www.w3.org/2000/svg"
 
 
 class Document(HTMLParser):
-    """What a document loads, and what stands in it that a strict policy forbids."""
+    """Return the files that a document loads, and the parts that a strict policy forbids."""
 
     def __init__(self, text: str) -> None:
         super().__init__()
@@ -30,15 +30,15 @@ class Document(HTMLParser):
         self.feed(text)
 
     def handle_starttag(self, tag, attrs):
-        given = dict(attrs)
+        inputs = dict(attrs)
         if tag in ("script", "img"):
-            self.loads.append(given.get("src") or "")
+            self.loads.append(inputs.get("src") or "")
         if tag == "link":
-            self.loads.append(given["href"])
+            self.loads.append(inputs["href"])
         self._script = tag in ("script", "style")
-        self.inline += [f"{name}=" for name in given if name == "style" or name.startswith("on")]
-        if "id" in given:
-            self.ids.append(given["id"])
+        self.inline += [f"{name}=" for name in inputs if name == "style" or name.startswith("on")]
+        if "id" in inputs:
+            self.ids.append(inputs["id"])
 
     def handle_data(self, data):
         if self._script and data.strip():
@@ -87,7 +87,7 @@ def test_the_document_holds_no_script_and_no_style():
     assert len(set(PAGE.ids)) == len(PAGE.ids)
 
 
-@pytest.mark.parametrize("path", OWN, ids=lambda path: path.name)
+@pytest.mark.parametrize("path", EXPECTED, ids=lambda path: path.name)
 def test_no_file_of_ours_names_another_host(path):
     text = path.read_text(encoding="utf-8").replace(SVG_NAMESPACE, "")
     assert re.findall(r"(?:https?:)?//[\w.-]+\.\w+\S*", text) == []
@@ -128,10 +128,10 @@ def test_modules_turn_no_text_into_elements():
 
 def test_the_checksum_stands_beside_the_library():
     for library in (FOLDER / "vendor").iterdir():
-        stated = [line.split() for line in (library / "SHA256SUMS").read_text("utf-8").splitlines()]
+        value = [line.split() for line in (library / "SHA256SUMS").read_text("utf-8").splitlines()]
         shipped = {path.name for path in library.iterdir()} - {"LICENSE", "SHA256SUMS"}
-        assert {name for _, name in stated} == shipped
-        for checksum, name in stated:
+        assert {name for _, name in value} == shipped
+        for checksum, name in value:
             assert sha256((library / name).read_bytes()).hexdigest() == checksum, name
 
 

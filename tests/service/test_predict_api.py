@@ -16,10 +16,10 @@ KEYWORD = {"pgv": "pgv_m_s", "pga": "pga_g", "tm": "tm_s", "pgd": "pgd_m"}
 
 
 def printed(capsys, database, values, **more):
-    """What `rbfrag predict --json` prints."""
-    given = {KEYWORD.get(name, name): value for name, value in values.items()}
+    """Return the output of `rbfrag predict --json`."""
+    inputs = {KEYWORD.get(name, name): value for name, value in values.items()}
     capsys.readouterr()
-    print_result(answer_block(given, **more, db=str(database)), json=True)
+    print_result(answer_block(inputs, **more, db=str(database)), json=True)
     return json.loads(capsys.readouterr().out)
 
 
@@ -37,10 +37,10 @@ def test_one_block_is_answered_as_by_the_command_line(client, database, capsys, 
     assert answer.status_code == 200
     assert answer.json() == printed(capsys, database, values, level=level)
     measures = {KEYWORD[name]: value for name, value in values.items() if name in KEYWORD}
-    own = rbfrag.predict(values["p2"], values["kr"], **measures, level=level, db=database)
-    assert answer.json()["probability"] == own.probability
-    assert answer.json()["ci_low"] == own.ci_low
-    assert answer.json()["ci_high"] == own.ci_high
+    expected = rbfrag.predict(values["p2"], values["kr"], **measures, level=level, db=database)
+    assert answer.json()["probability"] == expected.probability
+    assert answer.json()["ci_low"] == expected.ci_low
+    assert answer.json()["ci_high"] == expected.ci_high
 
 
 def test_planes_in_space_are_answered_as_by_the_command_line(client, database):
@@ -50,17 +50,17 @@ def test_planes_in_space_are_answered_as_by_the_command_line(client, database):
     shell = CliRunner().invoke(
         app, ["predict", *map(str, options), "--db", str(database), "--json"]
     )
-    wanted = json.loads(shell.stdout)
-    assert 0.0 < wanted["probability"] < 1.0
-    assert client.get("/v1/predict", params={**planes, **shape}).json() == wanted
+    target = json.loads(shell.stdout)
+    assert 0.0 < target["probability"] < 1.0
+    assert client.get("/v1/predict", params={**planes, **shape}).json() == target
     posted = client.post("/v1/predict", json={**planes, **shape, "base": ["4/150", "35/140"]})
     assert posted.status_code == 200
     for name in ("probability", "ci_low", "ci_high"):
-        assert posted.json()[name][0] == pytest.approx(wanted[name], rel=1e-11)
+        assert posted.json()[name][0] == pytest.approx(target[name], rel=1e-11)
         assert posted.json()[name][1] is None
     assert "base and back make a wedge" in posted.json()["reason"][1]
     alone = client.post("/v1/predict", json={**planes, **shape}).json()
-    assert alone == wanted
+    assert alone == target
 
 
 @settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
@@ -70,14 +70,14 @@ def test_lists_are_answered_within_rounding_of_single_blocks(client, rows):
     body = {name: [row[name] for row in rows] for name in names} | {"pga": 0.5}
     answer = client.post("/v1/predict", json=body)
     assert answer.status_code == 200
-    found = answer.json()
+    document = answer.json()
     for i, row in enumerate(rows):
-        query = {name: row[name] for name in names} | {"pga": 0.5, "model": found["model"]}
-        one = client.get("/v1/predict", params=query).json()
+        query = {name: row[name] for name in names} | {"pga": 0.5, "model": document["model"]}
+        single = client.get("/v1/predict", params=query).json()
         for name in ("probability", "ci_low", "ci_high"):
             rel = 1e-12 if name == "probability" else 1e-11  # as docs/howto/use-from-python.md says
-            assert found[name][i] == pytest.approx(one[name], rel=rel, abs=1e-250)
-        assert found["in_domain"][i] == one["in_domain"]
+            assert document[name][i] == pytest.approx(single[name], rel=rel, abs=1e-250)
+        assert document["in_domain"][i] == single["in_domain"]
 
 
 def test_every_kind_is_answered_and_lists_of_it(client):
@@ -86,26 +86,26 @@ def test_every_kind_is_answered_and_lists_of_it(client):
         ({"ks": 0.1, "ps2": 3.0, "rotation": 2}, "slumping"),
         ({"kct": 0.2, "pct2": 8.0}, "confined_toppling"),
     ):
-        one = client.get("/v1/predict", params={**block, "pgv": 0.4, "pga": 0.5}).json()
-        assert one["kind"] == kind
+        single = client.get("/v1/predict", params={**block, "pgv": 0.4, "pga": 0.5}).json()
+        assert single["kind"] == kind
         many = client.post("/v1/predict", json={**block, "pgv": [0.4, -1.0], "pga": 0.5}).json()
-        assert many["probability"][0] == pytest.approx(one["probability"], rel=1e-12)
+        assert many["probability"][0] == pytest.approx(single["probability"], rel=1e-12)
         assert many["probability"][1] is None
         assert many["kind"] == kind
 
 
 def test_a_list_says_which_element_cannot_be_used(client):
-    found = client.post(
+    result = client.post(
         "/v1/predict", json={"p2": 3, "kr": [0.1, -0.1, None], "pgv": [0.6, 0.6, 0.6]}
     ).json()
-    assert found["probability"][1:] == [1.0, None]
-    assert found["reason"][:2] == ["", "unstable"]
-    assert found["reason"][2].startswith("kr is not a number")
-    (said,) = (text for text in found["warnings"] if "could not be used" in text)
-    assert said.startswith(
+    assert result["probability"][1:] == [1.0, None]
+    assert result["reason"][:2] == ["", "unstable"]
+    assert result["reason"][2].startswith("kr is not a number")
+    (message,) = (text for text in result["warnings"] if "could not be used" in text)
+    assert message.startswith(
         "1 of 3 blocks could not be used; the reasons stand in the column reason"
     )
-    assert f"it is element 2: {found['reason'][2]}" in said
+    assert f"it is element 2: {result['reason'][2]}" in message
 
 
 @pytest.mark.parametrize(
@@ -145,38 +145,39 @@ def test_an_unknown_model_is_named_without_the_place_of_the_database(client, dat
 
 
 def test_uncertain_blocks_are_answered_as_from_python(client, database):
-    asked = {"p2": 3.0, "kr": 0.1, "pgv": 0.6, "kr_sigma": 0.2}
-    own = rbfrag.predict(3.0, 0.1, pgv_m_s=0.6, kr_sigma=0.2, db=database)
-    found = client.get("/v1/predict", params=asked).json()
-    assert {name: found[name] for name in ("probability", "ci_low", "block_sd")} == {
-        "probability": own.probability, "ci_low": own.ci_low, "block_sd": own.block_sd,
+    inputs = {"p2": 3.0, "kr": 0.1, "pgv": 0.6, "kr_sigma": 0.2}
+    expected = rbfrag.predict(3.0, 0.1, pgv_m_s=0.6, kr_sigma=0.2, db=database)
+    result = client.get("/v1/predict", params=inputs).json()
+    assert {name: result[name] for name in ("probability", "ci_low", "block_sd")} == {
+        "probability": expected.probability, "ci_low": expected.ci_low,
+        "block_sd": expected.block_sd,
     }  # fmt: skip
-    many = client.post("/v1/predict", json={**asked, "kr_sigma": [0.2, 0.2]}).json()
-    assert many["block_sd"] == pytest.approx([own.block_sd] * 2, rel=1e-12)
+    many = client.post("/v1/predict", json={**inputs, "kr_sigma": [0.2, 0.2]}).json()
+    assert many["block_sd"] == pytest.approx([expected.block_sd] * 2, rel=1e-12)
     certain = client.post("/v1/predict", json={"p2": 3.0, "kr": [0.1], "pgv": 0.6}).json()
     assert certain["block_sd"] is None
-    assert client.get("/v1/predict", params={**asked, "kr_sigma": -1}).status_code == 422
+    assert client.get("/v1/predict", params={**inputs, "kr_sigma": -1}).status_code == 422
 
 
 def test_free_standing_blocks_are_answered_as_by_the_command_line(client, database):
     motion = {"pgv": 0.6, "pga": 0.5}
-    own = rbfrag.predict(
+    expected = rbfrag.predict(
         7.0, 0.2, kind="rocking", restitution=0.9, pgv_m_s=0.6, pga_g=0.5, db=database
     )
-    asked = {"p2": 7, "kr": 0.2, "restitution": 0.9, "kind": "rocking", **motion}
-    found = client.get("/v1/predict", params=asked).json()
-    assert (found["kind"], found["failure"]) == ("rocking", "overturning")
-    assert found["probability"] == own.probability
-    many = client.post("/v1/predict", json={**asked, "kr": [0.2, 0.3]}).json()
-    assert many["probability"][0] == pytest.approx(own.probability, rel=1e-12)
+    inputs = {"p2": 7, "kr": 0.2, "restitution": 0.9, "kind": "rocking", **motion}
+    result = client.get("/v1/predict", params=inputs).json()
+    assert (result["kind"], result["failure"]) == ("rocking", "overturning")
+    assert result["probability"] == expected.probability
+    many = client.post("/v1/predict", json={**inputs, "kr": [0.2, 0.3]}).json()
+    assert many["probability"][0] == pytest.approx(expected.probability, rel=1e-12)
     shape = {"height": 2.0, "width": 0.5, "dip": 3.0, **motion}
-    one = client.get("/v1/predict", params={**shape, "kind": "rocking"}).json()
-    assert any("weaker sense" in text for text in one["warnings"])
-    free = client.get("/v1/predict", params={**shape, "no_back": True}).json()
-    assert free["probability"] == one["probability"]
+    single = client.get("/v1/predict", params={**shape, "kind": "rocking"}).json()
+    assert any("weaker sense" in text for text in single["warnings"])
+    free_standing = client.get("/v1/predict", params={**shape, "no_back": True}).json()
+    assert free_standing["probability"] == single["probability"]
     rows = {**shape, "dip": [3.0, -3.0], "kind": "rocking"}
     both = client.post("/v1/predict", json=rows).json()
-    assert both["probability"] == pytest.approx([one["probability"]] * 2, rel=1e-12)
-    wrong = client.get("/v1/predict", params={**asked, "restitution": 1.2})
+    assert both["probability"] == pytest.approx([single["probability"]] * 2, rel=1e-12)
+    wrong = client.get("/v1/predict", params={**inputs, "restitution": 1.2})
     assert wrong.status_code == 422
     assert "restitution = 1.2" in wrong.json()["detail"]

@@ -7,14 +7,12 @@ from fastapi import Request
 
 from rbfrag.db.engine import opened_database
 from rbfrag.db.models import load_model, save_model
-from rbfrag.db.upgrade import upgrade_database
 from rbfrag.errors import DatabaseFailedError
 from rbfrag.service.problem import answer_error, in_parameters
 from rbfrag.service.settings import ServiceSettings
 
 
 def fitted_anew(database):
-    upgrade_database(database)
     with opened_database(database) as engine, engine.begin() as connection:
         row = load_model(connection, "wls-pgv")
         raised = {**row.coefficients, "c1": 1.1 * row.coefficients["c1"]}
@@ -41,7 +39,7 @@ def test_the_database_is_only_read(client, database):
     database.chmod(0o400)
     assert client.get("/v1/models").status_code == 200
     assert database.read_bytes() == before
-    assert [each.name for each in database.parent.iterdir()] == [database.name]
+    assert [item.name for item in database.parent.iterdir()] == [database.name]
 
 
 def test_a_database_that_is_gone_is_said_without_its_place(client, database):
@@ -54,10 +52,10 @@ def test_a_database_that_is_gone_is_said_without_its_place(client, database):
 
 
 def test_a_server_is_not_named_in_an_answer():
-    told = ServiceSettings(db="postgresql://somebody:secret@db.example.org/rock")
+    document = ServiceSettings(db="postgresql://somebody:secret@db.example.org/rock")
     words = "there is no model 'x' in postgresql+psycopg://somebody:***@db.example.org/rock; it"
-    assert in_parameters(words, told) == "there is no model 'x' in the database; it"
+    assert in_parameters(words, document) == "there is no model 'x' in the database; it"
     failed = DatabaseFailedError("connection to db.example.org failed")
-    answer = answer_error(Request({"type": "http"}), failed, told)
+    answer = answer_error(Request({"type": "http"}), failed, document)
     assert answer.status_code == 503
     assert b"example.org" not in answer.body

@@ -56,12 +56,12 @@ class Client(threading.Thread):
                     return False  # told that it ends
 
 
-def sent(port, found):
+def sent(port, result):
     """Ask for something that takes longer."""
     with closing(http.client.HTTPConnection("127.0.0.1", port, timeout=120)) as connection:
         connection.request("POST", "/v1/spectrum?p2=3,1&polarity=both", RECORD.encode())
         with connection.getresponse() as answer:
-            found.append((answer.status, answer.read()))
+            result.append((answer.status, answer.read()))
 
 
 @pytest.mark.parametrize("workers", [1, 2])

@@ -26,14 +26,14 @@ def guarded(database):
 
 
 @pytest.mark.parametrize(
-    "given",
+    "inputs",
     [{}, {"authorization": "Bearer"}, {"authorization": f"Bearer {TOKEN}x"},
      {"authorization": TOKEN}, {"authorization": f"Basic {TOKEN}"},
      {"authorization": "Bearer é".encode("latin-1")}],
 )  # fmt: skip
-def test_without_the_token_nothing_is_answered(guarded, given):
+def test_without_the_token_nothing_is_answered(guarded, inputs):
     for path in (PATH, "/v1/models", "/v1/metrics", "/v1/openapi.json", "/v1/none"):
-        answer = guarded.get(path, headers=given)
+        answer = guarded.get(path, headers=inputs)
         assert answer.status_code == 401
         assert answer.headers["content-type"] == "application/problem+json"
         assert answer.headers["www-authenticate"].startswith("Bearer")
@@ -68,9 +68,9 @@ def test_this_computer_needs_none(host):
 
 
 def test_the_command_rejects_to_start_without_a_token(shell: Shell):
-    told = shell("serve", "--host", "0.0.0.0", expect=2).stderr
-    assert "RBFRAG_TOKEN" in told
-    assert "--token-file" in told
+    message = shell("serve", "--host", "0.0.0.0", expect=2).stderr
+    assert "RBFRAG_TOKEN" in message
+    assert "--token-file" in message
 
 
 @pytest.mark.parametrize(

@@ -24,10 +24,10 @@ class Waiting:
 
 @pytest.fixture(scope="module")
 def pool():
-    found = WorkerPool(1, 3.0)
-    ready(found)
-    yield found
-    found.close()
+    result = WorkerPool(1, 3.0)
+    ready(result)
+    yield result
+    result.close()
 
 
 def ready(pool):
@@ -35,8 +35,8 @@ def ready(pool):
     pool.open().schedule(slow_work.answer, args=("",)).result(120)
 
 
-def do(pool, *given, request=None):
-    return asyncio.run(pool.run(request or Waiting(), *given))
+def do(pool, *inputs, request=None):
+    return asyncio.run(pool.run(request or Waiting(), *inputs))
 
 
 def test_work_is_answered(pool):

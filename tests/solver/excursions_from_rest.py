@@ -1,4 +1,4 @@
-"""Whether any excursion from rest topples: the bisection that bounds of k_r are checked against."""
+"""Excursions from rest that topple: the bisection that bounds of k_r are checked against."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ def failing(excitation: BlockExcitation, table: ExcursionTable, kr: float) -> in
 
 
 def fails(excitation: Excitation, p2: float, kr: float) -> bool:
-    """Whether a block that starts from rest at any rise of k_h/(1 + k_v) above k_r topples."""
+    """Return whether a block at rest at any rise of k_h/(1 + k_v) above k_r topples."""
     table = excursion_table(excitation.q.size)
     return failing(block_excitation(excitation, p2=p2), table, kr) > 0
 

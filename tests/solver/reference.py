@@ -26,7 +26,7 @@ TIME_XTOL = 1e-15
 
 @dataclass(frozen=True)
 class ReferenceRun:
-    """How a run ended; the peak is None where the block topples."""
+    """End of a run; the peak is None where the block topples."""
 
     outcome: str
     peak_rad: float | None
@@ -207,7 +207,7 @@ def _after_the_record(
     if topples:
         return ReferenceRun("toppled", None, moved, started)
     if rate > 0.0:
-        left = -2.0 * energy / p2  # = x_top² or 4 sin²(x_top/2)
-        x_top = math.sqrt(left) if linear else 2.0 * math.asin(0.5 * math.sqrt(left))
+        remaining = -2.0 * energy / p2  # = x_top² or 4 sin²(x_top/2)
+        x_top = math.sqrt(remaining) if linear else 2.0 * math.asin(0.5 * math.sqrt(remaining))
         peak = max(peak, theta_c - x_top)
     return ReferenceRun("stable", peak, moved, started)

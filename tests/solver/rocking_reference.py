@@ -25,7 +25,7 @@ Vector = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Free:
+class FreeStandingBlock:
     """A parallelogram on its base; sides: 1 the toe, -1 the heel."""
 
     c: dict[int, float]
@@ -39,22 +39,25 @@ class Free:
 
 def parallelogram(
     a1_deg: float, a3_deg: float, r3_m: float, beta_deg: float, restitution: float | None
-) -> Free:
+) -> FreeStandingBlock:
     a1, a3, beta = (math.radians(angle) for angle in (a1_deg, a3_deg, beta_deg))
     r1_m = r3_m * math.cos(a3) / math.cos(a1)
-    own = (r1_m**2 + r3_m**2) / 6.0
-    about = {1: own + r3_m**2, -1: own + r1_m**2}
-    kept = own + r1_m * r3_m * math.cos(a3 - a1)
-    return Free(
+    expected = (r1_m**2 + r3_m**2) / 6.0
+    about = {1: expected + r3_m**2, -1: expected + r1_m**2}
+    retained = expected + r1_m * r3_m * math.cos(a3 - a1)
+    return FreeStandingBlock(
         c={1: a3 - beta, -1: beta - a1},
         p2={1: G * r3_m / about[1], -1: G * r1_m / about[-1]},
-        e={side: kept / about[-side] if restitution is None else restitution for side in (1, -1)},
+        e={
+            side: retained / about[-side] if restitution is None else restitution
+            for side in (1, -1)
+        },
     )
 
 
 @dataclass(frozen=True)
 class ReferenceRocking:
-    """How a run ended: sense of overturning (0: none), peaks by side [rad], impact times [s]."""
+    """End of a run: sense of overturning (0: none), peaks by side [rad], impact times [s]."""
 
     toppled: int
     peak: dict[int, float]
@@ -65,7 +68,9 @@ class ReferenceRocking:
 class _Arc:
     """Motion about one corner inside one interval, time counted from its start."""
 
-    def __init__(self, block: Free, side: int, h: float, k: ArrayLike, w: ArrayLike) -> None:
+    def __init__(
+        self, block: FreeStandingBlock, side: int, h: float, k: ArrayLike, w: ArrayLike
+    ) -> None:
         (k0, k1), (w0, w1) = np.asarray(k), np.asarray(w)
         self.k0, self.dk, self.w0, self.dw = side * k0, side * (k1 - k0) / h, w0, (w1 - w0) / h
         self.c, self.p2 = block.c[side], block.p2[side]
@@ -88,7 +93,7 @@ class _Arc:
 
 
 class _Run:
-    def __init__(self, block: Free) -> None:
+    def __init__(self, block: FreeStandingBlock) -> None:
         self.block = block
         self.side = 0
         self.y = np.zeros(2)
@@ -136,22 +141,24 @@ class _Run:
             self.y = last
             return h
         # turns are looked for between many places: an arc may be far shorter than an interval
-        places = t + (h - t) * np.concatenate([0.5 ** np.arange(30, 3, -1), np.arange(1, 13) / 12])
+        positions = t + (h - t) * np.concatenate(
+            [0.5 ** np.arange(30, 3, -1), np.arange(1, 13) / 12]
+        )
         before_t, before = t, self.y
-        for s in places:
-            here = arc.to(before_t, before, s)
-            if before[1] > 0.0 > here[1] or (before[1] == 0.0 > here[1] and before[0] > 0.0):
+        for s in positions:
+            local = arc.to(before_t, before, s)
+            if before[1] > 0.0 > local[1] or (before[1] == 0.0 > local[1] and before[0] > 0.0):
                 turn = arc.root(before_t, before, before_t, s, 1) if before[1] else before_t
                 top = arc.to(before_t, before, turn)
                 if top[0] > 0.0:
                     self.note(float(top[0]))
-                    if here[0] <= 0.0:
+                    if local[0] <= 0.0:
                         return self._hit(start_s, *self._landing(arc, turn, top, s))
-            if here[0] <= 0.0 and here[1] < 0.0:
+            if local[0] <= 0.0 and local[1] < 0.0:
                 if before[0] <= 0.0:
-                    return self._hit(start_s, s, here)
+                    return self._hit(start_s, s, local)
                 return self._hit(start_s, *self._landing(arc, before_t, before, s))
-            before_t, before = s, here
+            before_t, before = s, local
         self.y = before
         return h
 
@@ -169,7 +176,12 @@ class _Run:
 
 
 def integrate(
-    time_s: ArrayLike, k_h: ArrayLike, w: ArrayLike, block: Free, *, most_impacts: int = 10**9
+    time_s: ArrayLike,
+    k_h: ArrayLike,
+    w: ArrayLike,
+    block: FreeStandingBlock,
+    *,
+    most_impacts: int = 10**9,
 ) -> ReferenceRocking:
     """Run a block over nodes (time, k_h, 1 + k_v) and the rest after them.
 

@@ -50,16 +50,16 @@ GREATEST_DEVIATION = 1e-7
 
 
 def motions(records_dir: Path) -> list[tuple[GroundMotion, GroundMotion | None]]:
-    found: list[tuple[GroundMotion, GroundMotion | None]] = [
+    values: list[tuple[GroundMotion, GroundMotion | None]] = [
         (read_motions(records_dir / file)[0], None) for file in HORIZONTALS
     ]
     for file, up in WITH_VERTICAL:
-        found.append((read_motions(records_dir / file)[0], read_motions(records_dir / up)[0]))
+        values.append((read_motions(records_dir / file)[0], read_motions(records_dir / up)[0]))
     for folder in FOLDERS:
         for file in sorted(p for p in (records_dir / folder).iterdir() if p.is_file())[:5]:
             horizontal = [m for m in read_motions(file) if m.is_vertical is not True]
-            found.append((horizontal[0], None))
-    return found
+            values.append((horizontal[0], None))
+    return values
 
 
 def compare(

@@ -46,13 +46,13 @@ def test_outcome_next_to_critical(
     excited = excitation(motion, vertical, polarity)
     # where the border lies, the reference decides by itself, to 17 digits
     upper = result.upper if result.certified else result.lower * (1.0 + 1e-9)
-    found = border(excited, p2, result.lower * excited.pga_g, upper * excited.pga_g)
-    assert found is not None
-    assert result.kr == pytest.approx(found[0], rel=2e-9)
+    answer = border(excited, p2, result.lower * excited.pga_g, upper * excited.pga_g)
+    assert answer is not None
+    assert result.kr == pytest.approx(answer[0], rel=2e-9)
     outcomes = set()
     for distance in DISTANCES:
         for side in (-1.0, 1.0):
-            kr = found[0] * (1.0 + side * distance)
+            kr = answer[0] * (1.0 + side * distance)
             mine = OUTCOMES[simulate(excited, p2=p2, kr=kr).outcome].value
             assert mine == truth(excited, p2=p2, kr=kr).outcome, (distance, side)
             outcomes.add((side, mine))

@@ -12,19 +12,25 @@ import pytest
 
 import rbfrag
 from benchmarks.rocking_runs import compare, draw
-from rbfrag.bench.cases import Records
+from rbfrag.bench.peers import Records
 from rbfrag.errors import InputError
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.readers import read_motions
 from rbfrag.question.classify import classify_block
 from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.excitation import excitation
-from rbfrag.solver.integrator.free_batch import simulate_free
+from rbfrag.solver.kind import SupportedBlock
 from rbfrag.solver.models import model_of_kind
 from rbfrag.solver.models.rocking import SENSITIVITY, free_block, repeated
 from rbfrag.solver.respond import block_of_numbers
 from rbfrag.solver.results import Outcome, Response, ResponseHistory
-from rbfrag.solver.rocking_run import MOST_IMPACTS, corner_force, rocking_history, simulate
+from rbfrag.solver.rocking_run import (
+    MOST_IMPACTS,
+    corner_force,
+    rocking_history,
+    simulate,
+    simulate_free,
+)
 from tests.synthetic import shaking
 
 PALM, COYOTE = "N_Palm_Springs_1986_WWT-180", "Coyote_Lake_1979_G02-050"
@@ -48,7 +54,7 @@ REFERENCE = [
 ]  # fmt: skip
 
 
-def free(
+def respond_free_standing(
     motion: GroundMotion, p2: float, kr: float, restitution: float | None = None, **more: object
 ) -> Response:
     return rbfrag.respond(
@@ -96,13 +102,13 @@ def test_reference_values(records_dir: Path, row: tuple) -> None:
         assert run.peak_theta_rad == max(run.peak_forward_rad, run.peak_backward_rad)
     assert traced(run).impact_s[:3] == pytest.approx(impacts, abs=1e-6)
     assert not run.sensitive
-    site = rbfrag.solver.respond._site(
+    site = SupportedBlock.of(
         block, rbfrag.stability(block, beta_deg=beta, phi_deg=45.0, back_fracture=False),
-        model_of_kind("rocking"), {"restitution": restitution},
+        model_of_kind("rocking").mode, {"restitution": restitution},
     )  # fmt: skip
-    made = free_block(site)
-    found = (made.toe.p**2, made.heel.p**2, made.toe.passed_on, made.heel.passed_on)
-    assert found == pytest.approx(numbers, rel=1e-7)
+    result = free_block(site)
+    answer = (result.toe.p**2, result.heel.p**2, result.toe.passed_on, result.heel.passed_on)
+    assert answer == pytest.approx(numbers, rel=1e-7)
 
 
 @pytest.mark.parametrize("seed", range(6))
@@ -114,27 +120,30 @@ def test_the_mirror_image_of_block_and_motion_gives_the_mirrored_answer(seed: in
     block = Block.from_angles(
         beta - rng.uniform(4.0, 15.0), beta + rng.uniform(4.0, 15.0), rng.uniform(0.3, 3.0)
     )
-    one = rbfrag.respond(
+    single = rbfrag.respond(
         motion, kind="rocking", block=block, beta_deg=beta, vertical=vertical, history=True
     )
     other = rbfrag.respond(
         motion, kind="rocking", block=block.mirror(), beta_deg=-beta, vertical=vertical,
         polarity="reverse", history=True,
     )  # fmt: skip
-    assert one.outcome is other.outcome
-    assert one.started_s is not None
-    assert (one.peak_theta_rad, one.peak_theta_n) == (other.peak_theta_rad, other.peak_theta_n)
-    assert one.peak_forward_rad == other.peak_backward_rad
-    assert one.peak_backward_rad == other.peak_forward_rad
-    assert (one.impacts, one.sensitive) == (other.impacts, other.sensitive)
-    np.testing.assert_array_equal(traced(one).impact_s, traced(other).impact_s)
-    np.testing.assert_array_equal(traced(one).theta_rad, -traced(other).theta_rad)
+    assert single.outcome is other.outcome
+    assert single.started_s is not None
+    assert (single.peak_theta_rad, single.peak_theta_n) == (
+        other.peak_theta_rad,
+        other.peak_theta_n,
+    )
+    assert single.peak_forward_rad == other.peak_backward_rad
+    assert single.peak_backward_rad == other.peak_forward_rad
+    assert (single.impacts, single.sensitive) == (other.impacts, other.sensitive)
+    np.testing.assert_array_equal(traced(single).impact_s, traced(other).impact_s)
+    np.testing.assert_array_equal(traced(single).theta_rad, -traced(other).theta_rad)
 
 
 def test_quarter_period_and_ratio_of_speeds_are_housners() -> None:
     # so slender that sines are angles: p t = acosh(1/(1 - θ0/θc)) from a turn to the impact
     kr, p2 = 1e-5, 4.0
-    history = traced(free(pulse(1.6 * kr, 0.35, 10.0), p2, kr, 0.9))
+    history = traced(respond_free_standing(pulse(1.6 * kr, 0.35, 10.0), p2, kr, 0.9))
     rate, theta, time_s = history.theta_dot_rad_s, history.theta_rad, history.time_s
     turns = np.flatnonzero((rate == 0.0) & (theta != 0.0))
     assert turns.size >= 4
@@ -146,14 +155,14 @@ def test_quarter_period_and_ratio_of_speeds_are_housners() -> None:
         before, after = rate[time_s == impact_s]
         assert after / before == pytest.approx(0.9, rel=1e-9)
     housner = 1.0 - 1.5 * math.sin(0.3) ** 2
-    history = traced(free(pulse(0.5, 0.2, 5.0), p2, math.tan(0.3)))
+    history = traced(respond_free_standing(pulse(0.5, 0.2, 5.0), p2, math.tan(0.3)))
     before, after = history.theta_dot_rad_s[history.time_s == history.impact_s[0]]
     assert after / before == pytest.approx(housner, rel=1e-9)
 
 
 def test_energy_is_kept_between_impacts_and_falls_by_their_ratio() -> None:
     p2, theta_c, e = 3.0, 0.25, 0.93
-    history = traced(free(pulse(0.4, 0.4, 8.0), p2, math.tan(theta_c), e))
+    history = traced(respond_free_standing(pulse(0.4, 0.4, 8.0), p2, math.tan(theta_c), e))
     after = history.time_s > 0.5
     theta, rate = np.abs(history.theta_rad[after]), history.theta_dot_rad_s[after]
     energy = 0.5 * rate**2 + p2 * (np.cos(theta_c - theta) - math.cos(theta_c))
@@ -171,11 +180,13 @@ def test_nodes_on_the_line_between_samples_change_nothing() -> None:
     time_s = dt_s * np.arange(samples.size)
     finer_s = np.unique(np.concatenate([time_s, time_s[:-1] + 0.3 * dt_s]))
     finer = GroundMotion.from_nodes(finer_s, np.interp(finer_s, time_s, samples))
-    one = free(GroundMotion(samples, dt_s), 3.0, 0.25, 0.85)
-    other = free(finer, 3.0, 0.25, 0.85)
-    assert one.peak_forward_rad == pytest.approx(other.peak_forward_rad, rel=1e-10)
-    assert one.peak_backward_rad == pytest.approx(other.peak_backward_rad, rel=1e-10)
-    np.testing.assert_allclose(traced(one).impact_s[:20], traced(other).impact_s[:20], atol=1e-11)
+    single = respond_free_standing(GroundMotion(samples, dt_s), 3.0, 0.25, 0.85)
+    other = respond_free_standing(finer, 3.0, 0.25, 0.85)
+    assert single.peak_forward_rad == pytest.approx(other.peak_forward_rad, rel=1e-10)
+    assert single.peak_backward_rad == pytest.approx(other.peak_backward_rad, rel=1e-10)
+    np.testing.assert_allclose(
+        traced(single).impact_s[:20], traced(other).impact_s[:20], atol=1e-11
+    )
 
 
 def test_the_closed_form_after_the_record_is_what_integration_gives() -> None:
@@ -187,7 +198,10 @@ def test_the_closed_form_after_the_record_is_what_integration_gives() -> None:
             values = [0.0, 0.0, first, first, -0.31, -0.31]
             record = GroundMotion.from_nodes(times, values)
             longer = GroundMotion.from_nodes([*times, end_s, end_s + 40.0], [*values, 0.0, 0.0])
-            short, long = free(record, 6.0, 0.22, e), free(longer, 6.0, 0.22, e)
+            short, long = (
+                respond_free_standing(record, 6.0, 0.22, e),
+                respond_free_standing(longer, 6.0, 0.22, e),
+            )
             outcomes.add((short.outcome, short.peak_forward_rad is None))
             assert short.outcome is long.outcome
             for ours, theirs in (
@@ -222,7 +236,7 @@ def test_without_restitution_a_block_that_cannot_turn_back_topples_as_a_backed_o
 
 def test_an_independent_integrator_agrees() -> None:
     motions = tuple(GroundMotion(shaking(seed, npts=350), 0.02) for seed in range(4))
-    runs = [compare(each) for each in draw(Records(motions, "made up"), 8, seed=3)]
+    runs = [compare(item) for item in draw(Records(motions, "made up"), 8, seed=3)]
     certain = [run for run in runs if not run.sensitive]
     assert len(certain) >= 6
     assert all(run.impacts >= 0 for run in runs)
@@ -253,13 +267,13 @@ def test_a_block_at_its_border_is_sensitive() -> None:
     low, high = 0.02, 3.0
     while high - low > 1e-8 * low:
         middle = 0.5 * (low + high)
-        stays = free(motion, 3.0, middle, 0.8).outcome is Outcome.STABLE
+        stays = respond_free_standing(motion, 3.0, middle, 0.8).outcome is Outcome.STABLE
         low, high = (low, middle) if stays else (middle, high)
-    border = free(motion, 3.0, high, 0.8)
+    border = respond_free_standing(motion, 3.0, high, 0.8)
     assert border.outcome is Outcome.STABLE
     assert border.sensitive
     assert any("sensitive" in warning for warning in border.warnings)
-    assert not free(motion, 3.0, 2.0 * high, 0.8).sensitive
+    assert not respond_free_standing(motion, 3.0, 2.0 * high, 0.8).sensitive
 
 
 def test_a_batch_gives_each_block_what_its_own_run_gives() -> None:
@@ -269,7 +283,7 @@ def test_a_batch_gives_each_block_what_its_own_run_gives() -> None:
         for p2 in (30.0, 1.0)
         for kr in np.geomspace(0.02, 0.6, 12).tolist()
     ]
-    runs = simulate_free(
+    outcome, theta_n, sensitive = simulate_free(
         excited,
         np.array([(block.toe, block.heel) for block in blocks]),
         np.array([block.rest_speed for block in blocks]),
@@ -278,31 +292,31 @@ def test_a_batch_gives_each_block_what_its_own_run_gives() -> None:
     )
     for i, block in enumerate(blocks):
         alone = simulate(excited, block)
-        assert runs.outcome[i] == alone.outcome
-        assert runs.sensitive[i] == repeated(excited, block, alone)[0]
+        assert outcome[i] == alone.outcome
+        assert sensitive[i] == repeated(excited, block, alone)[0]
         if alone.outcome == 0:
             ratios = (alone.forward.x, alone.backward.x)
-            assert runs.theta_n[i] == max(ratios) / block.toe.theta_c
+            assert theta_n[i] == max(ratios) / block.toe.theta_c
         else:
-            assert np.isnan(runs.theta_n[i])
-    assert 0 < (runs.outcome == 1).sum() < len(blocks)
+            assert np.isnan(theta_n[i])
+    assert 0 < (outcome == 1).sum() < len(blocks)
 
 
 def test_a_polygon_answers_as_the_rectangle_it_is() -> None:
     motion = GroundMotion(shaking(2), 0.02)
     corners = [(0.0, 0.0), (0.4, 0.0), (0.4, 1.2), (0.2, 1.2), (0.0, 1.2)]
     polygon = Block.from_polygon(corners, heel=0, back=4, toe=1, gamma_deg=90.0)
-    one, other, numbers = (
-        rbfrag.respond(motion, kind="rocking", **what)
-        for what in (
+    single, other, numbers = (
+        rbfrag.respond(motion, kind="rocking", **subject)
+        for subject in (
             {"block": polygon, "beta_deg": 0.0},
             {"block": Block.rectangle(1.2, 0.4), "beta_deg": 0.0},
             {"p2": Block.rectangle(1.2, 0.4).p2, "kr": 0.4 / 1.2},
         )
     )
-    assert one.outcome is other.outcome is numbers.outcome is Outcome.STABLE
-    assert one.impacts > 0
-    assert one.peak_forward_rad == pytest.approx(other.peak_forward_rad, rel=1e-9)
+    assert single.outcome is other.outcome is numbers.outcome is Outcome.STABLE
+    assert single.impacts > 0
+    assert single.peak_forward_rad == pytest.approx(other.peak_forward_rad, rel=1e-9)
     assert numbers.peak_forward_rad == pytest.approx(other.peak_forward_rad, rel=1e-9)
 
 
@@ -348,14 +362,14 @@ def test_the_force_on_the_corner_is_that_of_the_motion_of_the_centroid() -> None
     moves = away & (history.theta_rad[at][1:-1] != 0.0)
     assert moves.sum() > 500
     needed = (np.abs(along) / across)[moves].max()
-    site = rbfrag.solver.respond._site(
+    site = SupportedBlock.of(
         block, rbfrag.stability(block, beta_deg=beta, phi_deg=45.0, back_fracture=False),
-        model_of_kind("rocking"), {},
+        model_of_kind("rocking").mode, {},
     )  # fmt: skip
-    made = free_block(site)
+    result = free_block(site)
     excited = excitation(motion, vertical)
-    shown = rocking_history(excited, made, answer.impacts).motion
-    force = corner_force(made, shown, math.inf, float(time_s[-1]))
+    shown = rocking_history(excited, result, answer.impacts)
+    force = corner_force(result, shown, math.inf, float(time_s[-1]))
     assert force.slips_s is None
     assert force.friction == pytest.approx(needed, rel=0.01)
 
@@ -371,7 +385,7 @@ def test_friction_warns_and_does_not_reject() -> None:
 
 
 def test_a_stocky_block_comes_to_rest_at_every_impact() -> None:
-    answer = free(pulse(3.0, 0.2, 3.0), 5.0, 2.0)
+    answer = respond_free_standing(pulse(3.0, 0.2, 3.0), 5.0, 2.0)
     assert answer.outcome is Outcome.STABLE
     assert answer.impacts == 1
     assert answer.peak_backward_rad == 0.0
@@ -389,8 +403,10 @@ def test_without_a_back_plane_a_block_that_topples_rocks() -> None:
     backed = rbfrag.respond(motion, block=block, back_fracture=False, kind="toppling", **planes)
     assert any("no plane backs the block" in text for text in backed.warnings)
     assert not any("no plane backs" in text for text in alone.warnings)
-    told = classify_block({"block": block, **planes, "back_fracture": False}, "toppling").remarks
-    assert any("no plane backs" in text for text in told)
+    document = classify_block(
+        {"block": block, **planes, "back_fracture": False}, "toppling"
+    ).remarks
+    assert any("no plane backs" in text for text in document)
     assert rbfrag.respond(motion, p2=3.0, kr=0.2).kind == "toppling"
     flat = Block.from_fractures(1.0, 2.0, 90.0)
     slides = rbfrag.respond(motion, block=flat, beta_deg=20.0, phi_deg=30.0, back_fracture=False)
@@ -401,14 +417,14 @@ def test_a_throw_is_reported() -> None:
     motion = GroundMotion(shaking(3), 0.02)
     samples = np.zeros(600)
     samples[260] = -1.2
-    answer = free(motion, 3.0, 0.3, vertical=GroundMotion(samples, 0.02))
+    answer = respond_free_standing(motion, 3.0, 0.3, vertical=GroundMotion(samples, 0.02))
     assert answer.outcome is Outcome.JUMP
     assert (answer.peak_theta_rad, answer.peak_forward_rad, answer.toppled_s) == (None, None, None)
     assert any("throws" in text for text in answer.warnings)
 
 
 @pytest.mark.parametrize(
-    ("given", "words"),
+    ("inputs", "words"),
     [
         ({"p2": 3.0, "kr": 0.2, "restitution": 0.0}, "restitution = 0: give the coefficient"),
         ({"p2": 3.0, "kr": 0.2, "restitution": 1.01}, "above 0 and up to 1"),
@@ -430,10 +446,10 @@ def test_a_throw_is_reported() -> None:
         ),
     ],
 )  # fmt: skip
-def test_what_no_model_covers_is_rejected(given: dict, words: str) -> None:
+def test_what_no_model_covers_is_rejected(inputs: dict, words: str) -> None:
     motion = GroundMotion(shaking(3), 0.02)
     with pytest.raises(InputError, match=words):
-        rbfrag.respond(motion, kind="rocking", **given)
+        rbfrag.respond(motion, kind="rocking", **inputs)
 
 
 def test_restitution_is_an_option_of_this_kind_alone() -> None:

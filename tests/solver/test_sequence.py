@@ -43,28 +43,28 @@ def final(answer: Response) -> tuple[float, ...]:
 def test_one_motion_in_two_parts_is_one_motion(name: str) -> None:
     # cut where nothing moves: the trajectory is the same
     first, second = motion(1), motion(2)
-    whole = GroundMotion(np.concatenate([first.acceleration_g, second.acceleration_g[1:]]), DT_S)
-    one = respond(whole, **BLOCKS[name], history=True)
+    complete = GroundMotion(np.concatenate([first.acceleration_g, second.acceleration_g[1:]]), DT_S)
+    single = respond(complete, **BLOCKS[name], history=True)
     two = respond([first, second], **BLOCKS[name], history=True)
-    assert one.displacement_m is not None
-    assert one.displacement_m > 0.005
+    assert single.displacement_m is not None
+    assert single.displacement_m > 0.005
     assert [part.response.started_s is not None for part in two.parts] == [True, True]
-    assert final(two) == pytest.approx(final(one), rel=1e-10, abs=1e-12)
-    assert two.displacement_m == pytest.approx(one.displacement_m, rel=1e-10)
-    if one.peak_theta_rad is not None:
-        assert two.peak_theta_rad == pytest.approx(one.peak_theta_rad, rel=1e-10)
-    assert two.peak_displacement_m == pytest.approx(one.peak_displacement_m, rel=1e-10)
-    assert two.started_s == one.started_s
-    assert two.stopped_s == pytest.approx(one.stopped_s, abs=1e-10)
-    assert two.centroid_displacement_m == pytest.approx(one.centroid_displacement_m, rel=1e-10)
+    assert final(two) == pytest.approx(final(single), rel=1e-10, abs=1e-12)
+    assert two.displacement_m == pytest.approx(single.displacement_m, rel=1e-10)
+    if single.peak_theta_rad is not None:
+        assert two.peak_theta_rad == pytest.approx(single.peak_theta_rad, rel=1e-10)
+    assert two.peak_displacement_m == pytest.approx(single.peak_displacement_m, rel=1e-10)
+    assert two.started_s == single.started_s
+    assert two.stopped_s == pytest.approx(single.stopped_s, abs=1e-10)
+    assert two.centroid_displacement_m == pytest.approx(single.centroid_displacement_m, rel=1e-10)
     # and so it is on the way, where both histories have a state
-    assert one.history is not None
+    assert single.history is not None
     assert two.history is not None
     for ours in ("displacement_m", "turned_rad"):
-        there = np.interp(one.history.time_s, two.history.time_s, getattr(two.history, ours))
-        nodes = np.isin(one.history.time_s, whole.time_s)
-        here = getattr(one.history, ours)
-        assert there[nodes] == pytest.approx(here[nodes], abs=1e-10)
+        there = np.interp(single.history.time_s, two.history.time_s, getattr(two.history, ours))
+        nodes = np.isin(single.history.time_s, complete.time_s)
+        local = getattr(single.history, ours)
+        assert there[nodes] == pytest.approx(local[nodes], abs=1e-10)
 
 
 @pytest.mark.parametrize("name", BLOCKS)
@@ -92,7 +92,7 @@ def test_values_of_a_sequence() -> None:
         assert part.begins_s == pytest.approx(before.begins_s + length_s + 5.0)
     assert answer.samples_total == sum(part.samples_total for part in parts)
     as_dict = answer.as_dict()
-    assert [part["motion"] for part in as_dict["parts"]] == [each.label for each in motions]
+    assert [part["motion"] for part in as_dict["parts"]] == [item.label for item in motions]
     assert as_dict["parts"][1]["start"] == as_dict["parts"][0]["end"]
     assert "parts" not in parts[0].as_dict()
 
@@ -100,11 +100,11 @@ def test_values_of_a_sequence() -> None:
 def test_toppling_and_rocking_start_again_from_rest() -> None:
     for kind in ("toppling", "rocking"):
         motions = [motion(1, 1.0), motion(2, 1.0)]
-        alone = [respond(each, p2=3.0, kr=0.25, kind=kind) for each in motions]
+        alone = [respond(item, p2=3.0, kr=0.25, kind=kind) for item in motions]
         answer = respond(motions, p2=3.0, kr=0.25, kind=kind)
-        assert None not in [each.peak_theta_n for each in alone]
+        assert None not in [item.peak_theta_n for item in alone]
         assert [part.response.peak_theta_n for part in answer.parts] == [
-            each.peak_theta_n for each in alone
+            item.peak_theta_n for item in alone
         ]
         assert any("carries no state" in text for text in answer.warnings)
         assert answer.displacement_m is None
@@ -125,11 +125,11 @@ def test_a_block_still_in_motion_is_waited_for() -> None:
     assert first.response.stopped_s is not None
     assert first.response.stopped_s > 0.6
     assert second.begins_s == pytest.approx(first.response.stopped_s)
-    (said,) = [text for text in answer.warnings if "longer than the gap" in text]
+    (message,) = [text for text in answer.warnings if "longer than the gap" in text]
     longer_s = first.response.stopped_s - 0.5
-    assert f"moves on after motion 1 for {longer_s:.3g} s longer than the gap" in said
-    assert "motion 2 is applied when it is at rest" in said
-    assert len(said) < 500
+    assert f"moves on after motion 1 for {longer_s:.3g} s longer than the gap" in message
+    assert "motion 2 is applied when it is at rest" in message
+    assert len(message) < 500
     # after the last motion nothing begins
     assert not any("longer than the gap" in text for text in respond([cut], **SLIDE).warnings)
 
@@ -185,9 +185,9 @@ def test_sums_of_slides_with_too_short_a_gap_keep_within_what_the_warning_says()
     for seed in range(40):
         first = rng.uniform(1.5, 5.0) * shaking(seed)[: rng.integers(250, 400)]
         second = rng.uniform(1.5, 5.0) * shaking(seed + 100)[rng.integers(150, 300) :]
-        one = DT_S * np.arange(first.size)
-        other = one[-1] + DT_S * np.arange(second.size)
-        whole = GroundMotion.from_nodes(np.r_[one, other], np.r_[first, second])
+        single = DT_S * np.arange(first.size)
+        other = single[-1] + DT_S * np.arange(second.size)
+        complete = GroundMotion.from_nodes(np.r_[single, other], np.r_[first, second])
         motions = [GroundMotion(first, DT_S), GroundMotion(second, DT_S)]
         apart = respond(motions, **SLIDE, history=True)
         if not any("longer than the gap" in text for text in apart.warnings):
@@ -196,9 +196,9 @@ def test_sums_of_slides_with_too_short_a_gap_keep_within_what_the_warning_says()
         history = apart.parts[0].response.history
         assert history is not None
         assert history.displacement_m is not None
-        at_end = np.interp(one[-1], history.time_s, history.displacement_m)
+        at_end = np.interp(single[-1], history.time_s, history.displacement_m)
         slip_after = slip(apart.parts[0].response) - at_end
-        assert slip(apart) - slip(respond(whole, ky=0.05)) <= slip_after + 1e-12
+        assert slip(apart) - slip(respond(complete, ky=0.05)) <= slip_after + 1e-12
     assert moved_on > 15
 
 

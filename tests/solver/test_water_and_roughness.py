@@ -173,7 +173,7 @@ def test_many_answer_as_one() -> None:
     answered = 0
     for i in range(n):
         try:
-            one = stability(
+            single = stability(
                 Block.from_fractures(s1[i], s2[i], gamma[i]), beta_deg=beta[i], phi_deg=phi[i],
                 phi_back_deg=phi[i], water_m=z[i], jrc=jrc[i], jcs_mpa=jcs[i], density_kg_m3=RHO,
             )  # fmt: skip
@@ -181,8 +181,8 @@ def test_many_answer_as_one() -> None:
             assert many.reason[i]
             continue
         answered += 1
-        assert many.mode[i] == one.mode
-        assert many.yield_acceleration[i] == pytest.approx(one.yield_acceleration, rel=1e-9)
+        assert many.mode[i] == single.mode
+        assert many.yield_acceleration[i] == pytest.approx(single.yield_acceleration, rel=1e-9)
     assert answered > 100
 
 
@@ -190,16 +190,16 @@ SHAPE = {"s1_m": 2.0, "s2_m": 3.0, "gamma_deg": 60.0, "beta_deg": 20.0, "phi_deg
 
 
 def test_roughness_has_no_probability_unless_a_residual_angle_is_given() -> None:
-    asked = {**SHAPE, "displacement_m": 0.05, "pgv_m_s": 0.6}
+    inputs = {**SHAPE, "displacement_m": 0.05, "pgv_m_s": 0.6}
     rough = {"jrc": 8.0, "jcs_mpa": 60.0, "density_kg_m3": RHO}
     with pytest.raises(InputError, match="roughness ends with the first slip"):
-        rbfrag.predict(**asked, **rough)
-    left = rbfrag.predict(**asked, **rough, phi_residual_deg=30.0)
-    smooth = rbfrag.predict(**{**asked, "phi_deg": 30.0})
-    assert left.probability == smooth.probability
-    assert any("phi_residual_deg" in text for text in left.warnings)
+        rbfrag.predict(**inputs, **rough)
+    remaining = rbfrag.predict(**inputs, **rough, phi_residual_deg=30.0)
+    smooth = rbfrag.predict(**{**inputs, "phi_deg": 30.0})
+    assert remaining.probability == smooth.probability
+    assert any("phi_residual_deg" in text for text in remaining.warnings)
     with pytest.raises(InputError, match="does not stand"):
-        rbfrag.predict(**asked, **rough, phi_residual_deg=15.0)
+        rbfrag.predict(**inputs, **rough, phi_residual_deg=15.0)
 
 
 def test_roughness_is_not_followed_in_time_before_the_first_slip() -> None:
@@ -209,11 +209,11 @@ def test_roughness_is_not_followed_in_time_before_the_first_slip() -> None:
     with pytest.raises(InputError, match=r"jrc cannot be combined with .* history of sliding"):
         rbfrag.respond(motion, **on, jrc=8.0, jcs_mpa=60.0)
     rough = {"jrc": 8.0, "jcs_mpa": 60.0}
-    left = rbfrag.respond(motion, **on, **rough, water_m=1.1372, phi_residual_deg=30.0)
+    remaining = rbfrag.respond(motion, **on, **rough, water_m=1.1372, phi_residual_deg=30.0)
     smooth = rbfrag.respond(motion, **{**on, "phi_deg": 30.0}, water_m=1.1372)
-    assert left.displacement_m == smooth.displacement_m
+    assert remaining.displacement_m == smooth.displacement_m
     assert smooth.displacement_m is not None
-    assert any("after its first slip" in text for text in left.warnings)
+    assert any("after its first slip" in text for text in remaining.warnings)
     with pytest.raises(InputError, match="does not stand on phi_residual_deg"):
         rbfrag.respond(motion, **on, **rough, water_m=1.1372, phi_residual_deg=15.0)
     with pytest.raises(InputError, match="water_m cannot be combined with p2 and kr"):

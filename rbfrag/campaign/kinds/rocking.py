@@ -16,12 +16,11 @@ from rbfrag.campaign.kind import (
     strengths_at,
 )
 from rbfrag.errors import InputError
-from rbfrag.solver.integrator.free_batch import simulate_free
 from rbfrag.solver.kind import Shaking
 from rbfrag.solver.models.rocking import SENSITIVITY, rectangle, restitution_of_rectangle
 from rbfrag.solver.quantity import positive
 from rbfrag.solver.results import DEFAULT_P2, FloatArray, SearchPoints
-from rbfrag.solver.rocking_run import MOST_IMPACTS
+from rbfrag.solver.rocking_run import MOST_IMPACTS, simulate_free
 from rbfrag.solver.toppling_run import OUTCOMES, reject_endless
 
 FACTOR = "restitution_factor"
@@ -82,22 +81,20 @@ class RockingCampaign(CampaignKind):
             for kr in (ratios * excited.pga_g).tolist()
         ]
         reject_endless(excited, max(case.size for case in cases))
-        runs = simulate_free(
+        outcome, theta_n, is_sensitive = simulate_free(
             excited,
             np.array([(block.toe, block.heel) for block in blocks]),
             np.array([block.rest_speed for block in blocks]),
             most_impacts=MOST_IMPACTS,
             change=SENSITIVITY,
         )
-        words = [OUTCOMES[code].value for code in runs.outcome.tolist()]
+        words = [OUTCOMES[code].value for code in outcome.tolist()]
         results, start = [], 0
         for ratios in strengths:
             part = slice(start, start + len(ratios))
             start += len(ratios)
-            sensitive = runs.sensitive[part] > 0
-            points = SearchPoints(
-                ratios, runs.theta_n[part], tuple(words[part]), sensitive=sensitive
-            )
+            sensitive = is_sensitive[part] > 0
+            points = SearchPoints(ratios, theta_n[part], tuple(words[part]), sensitive=sensitive)
             results.append(CaseResult(None, points))
         return results
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import sys
 
+from rbfrag.cli import options
+from rbfrag.cli.command import option
 from rbfrag.cli.output import print_json, print_pairs, print_table
-from rbfrag.cli.parameters import options
-from rbfrag.cli.parameters.option_groups import option, stacked
 
 EXAMPLE = "Example:  rbfrag bench"
 
@@ -14,7 +14,6 @@ CASES = 12
 """Runs by each method: half a minute on a quiet machine, most of it for callbacks in Python."""
 
 
-@stacked
 def bench(
     *,
     records: str | None = option(
@@ -33,7 +32,7 @@ def bench(
     import time
     from dataclasses import asdict
 
-    from rbfrag.bench.cases import choose_cases, find_records
+    from rbfrag.bench.peers import choose_cases, find_records
     from rbfrag.bench.work_precision import (
         BenchMethod,
         general_methods,
@@ -41,7 +40,7 @@ def bench(
         taylor_run,
         work_precision_table,
     )
-    from rbfrag.campaign.machine import machine
+    from rbfrag.campaign.runner import machine
 
     started = time.perf_counter()
     about = machine()

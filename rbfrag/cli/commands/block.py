@@ -5,10 +5,9 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Annotated
 
+from rbfrag.cli import options
+from rbfrag.cli.command import Fields, Inputs, option
 from rbfrag.cli.output import check_files, print_json, print_result, write_table
-from rbfrag.cli.parameters import options
-from rbfrag.cli.parameters.block import MeshOptions
-from rbfrag.cli.parameters.option_groups import ParsedInputs, fields_of, option, stacked
 from rbfrag.results.diagnostic import Diagnostic
 from rbfrag.vocabulary.quantities import AT_REST, COMMON, JOINT, PLANES, SHAPE
 
@@ -21,14 +20,26 @@ FREE_STANDING = Diagnostic(
 EXAMPLE = "Example:  rbfrag block --height 2.4 --width 0.5 --dip 3 --phi 35"
 
 
-@stacked
 def block(
     *,
     inputs: Annotated[
-        ParsedInputs,
-        fields_of(*SHAPE, *PLANES, *JOINT, *COMMON, *AT_REST, without=("kind", "phi_residual_deg")),
+        Inputs,
+        Fields(*SHAPE, *PLANES, *JOINT, *COMMON, *AT_REST, without=("kind", "phi_residual_deg")),
     ],
-    mesh: MeshOptions,
+    mesh: str | None = option(
+        "Closed mesh of a free-standing block [m] in its measured resting pose on level "
+        "ground (.obj, .ply, .stl)",
+        metavar="FILE",
+    ),
+    up: str = option("Vertical axis of the mesh, positive upward: x, y or z", "z"),
+    contact_mm: float = option(
+        "Maximum height of contact vertices above the lowest vertex [mm]", 10.0
+    ),
+    out: str | None = option(
+        "Output table of the blocks of a mesh, one row per azimuth (.csv, .xlsx, .parquet)",
+        metavar="FILE",
+    ),
+    excel_text: options.ExcelText = False,
     plot: str | None = option(
         "Figure of the block on its planes with contacts and resultant at yield, or of the "
         "contacts of a mesh and k_r over azimuth (.png, .pdf, .svg)"
@@ -38,7 +49,8 @@ def block(
         "(.xlsx, .csv)",
         metavar="FILE",
     ),
-    printing: options.Printing,
+    verbose: options.Verbose = False,
+    json: options.Json = False,
 ) -> None:
     """Print the failure mode, yield accelerations and p² of a block.
 
@@ -49,17 +61,28 @@ def block(
     restitution about its ground contacts.
     """
     if template is not None:
-        from rbfrag.exchange.block_template import COLUMNS, write_template
+        from rbfrag.exchange.block_table import COLUMNS, write_template
 
         written = str(write_template(template))
-        if printing.json:
+        if json:
             print_json({"template": written, "columns": list(COLUMNS)})
         else:
             print(f"{written}: write a row for each block in place of the example, then  rbfrag")
             print(f"predict --blocks {written}  with an intensity measure, as --pgv 0.6")
         return
-    if mesh.mesh is not None:
-        _mesh(mesh.mesh, mesh, inputs.get("density_kg_m3"), plot, printing)
+    if mesh is not None:
+        from rbfrag.exchange.mesh_file import block_from_mesh
+
+        check_files(table=out, plot=plot, excel_text=excel_text)
+        density = inputs.get("density_kg_m3")
+        solid = block_from_mesh(mesh, up=up, contact_mm=contact_mm, density_kg_m3=density)
+        if out is not None:
+            write_table(solid.table_columns(), out, excel_text=excel_text)
+        if plot is not None:
+            from rbfrag.plots.block import plot_mesh_block
+
+            plot_mesh_block(solid, plot)
+        print_result(solid, json=json, verbose=verbose)
         return
     from rbfrag.question.classify import on_planes
     from rbfrag.solver.kinds import kind_of_mode
@@ -73,28 +96,7 @@ def block(
     if unbacked and kind_of_mode(result.mode, back_fracture=False).free_standing:
         result = replace(result, warnings=(*result.warnings, FREE_STANDING))
     if plot is not None:
-        from rbfrag.plots.blocks.block import plot_block
+        from rbfrag.plots.block import plot_block
 
         plot_block(body, result, plot)
-    print_result(result, json=printing.json, verbose=printing.verbose)
-
-
-def _mesh(
-    path: str,
-    about: MeshOptions,
-    density: float | None,
-    plot: str | None,
-    printing: options.Printing,
-) -> None:
-    """Print the weakest azimuth of a mesh, and the effect of the contact height."""
-    from rbfrag.exchange.mesh_file import block_from_mesh
-
-    check_files(table=about.out, plot=plot, excel_text=about.excel_text)
-    body = block_from_mesh(path, up=about.up, contact_mm=about.contact_mm, density_kg_m3=density)
-    if about.out is not None:
-        write_table(body.columns(), about.out, excel_text=about.excel_text)
-    if plot is not None:
-        from rbfrag.plots.blocks.mesh_block import plot_mesh_block
-
-        plot_mesh_block(body, plot)
-    print_result(body, json=printing.json, verbose=printing.verbose)
+    print_result(result, json=json, verbose=verbose)

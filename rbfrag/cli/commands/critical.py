@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
+from rbfrag.cli import options
+from rbfrag.cli.command import Fields, Inputs, option
+from rbfrag.cli.inputs import find_shaking, numbers_of
 from rbfrag.cli.output import check_files, print_result, say_when_compiling
-from rbfrag.cli.parameters import options
-from rbfrag.cli.parameters.block import numbers_of
-from rbfrag.cli.parameters.motion import find_shaking
-from rbfrag.cli.parameters.option_groups import ParsedInputs, fields_of, option, stacked
 from rbfrag.errors import InputError
 from rbfrag.vocabulary.quantities import COMMON, JOINT, PLANES, SHAPE
 
@@ -24,38 +23,32 @@ FINE_ENOUGH_TO_DRAW = 1e-7
 """Width of k_r/PGA to which the map of a figure is made, borders being thin lines."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class Searched:
-    """Kind of failure and failure limit of the search."""
-
-    kind: str | None = option(
-        "Kind of failure: toppling, sliding, slumping or confined_toppling [default: "
-        "toppling with --p2, else from the failure mode of the geometry]"
-    )
-    rotation: float | None = option(
-        "Rotation limit of slumping and confined toppling [deg] [default: failure past recovery]"
-    )
-    displacement: str | None = option(
-        "Displacement limits of sliding on a level plane [m] [default: 0.01,0.05,0.15,0.3]",
-        metavar="LIST",
-    )
-
-
-@stacked
 def critical(
     *,
     motion: options.Motion,
     inputs: Annotated[
-        ParsedInputs,
-        fields_of("p2", *SHAPE, *PLANES, *JOINT, *COMMON, without=("kind",)),
+        Inputs,
+        Fields("p2", *SHAPE, *PLANES, *JOINT, *COMMON, without=("kind",)),
     ],
+    vertical: options.Vertical = None,
     direction: options.Direction,
-    reading: options.ReadingOptions,
-    searched: Searched,
+    slope_azimuth: options.SlopeAzimuth = None,
+    reading: options.Reading,
+    kind: str | None = option(
+        "Kind of failure: toppling, sliding, slumping or confined_toppling [default: "
+        "toppling with --p2, else from the failure mode of the geometry]"
+    ),
+    rotation: float | None = option(
+        "Rotation limit of slumping and confined toppling [deg] [default: failure past recovery]"
+    ),
+    displacement: str | None = option(
+        "Displacement limits of sliding on a level plane [m] [default: 0.01,0.05,0.15,0.3]",
+        metavar="LIST",
+    ),
     full_map: bool = option(
         "Map of toppling and stable intervals of k_r/PGA down to 0.01, limits to 1e-4",
         False,
-        word="--map",
+        "--map",
     ),
     plot: str | None = option(
         "Figure of the map, peak rotations, bracket and upper bound (.png, .pdf, .svg); "
@@ -63,7 +56,8 @@ def critical(
         metavar="FILE",
     ),
     db: options.Db = None,
-    printing: options.Printing,
+    verbose: options.Verbose = False,
+    json: options.Json = False,
 ) -> None:
     """Compute the critical strength of an accelerogram, with bounds.
 
@@ -72,30 +66,33 @@ def critical(
     smallest scale factor of the record at which the block fails.
     """
     from rbfrag.solver.critical import critical as search
-    from rbfrag.solver.kinds import facts_of
+    from rbfrag.solver.kinds import KINDS, facts_of
     from rbfrag.solver.respond import respond
     from rbfrag.solver.results import MAP_DEPTH
 
-    rotation, displacement = searched.rotation, searched.displacement
-    if searched.kind is not None and (why := facts_of(searched.kind).no_search):
-        raise InputError(f"--kind {searched.kind} has no critical value: {why}")
-    block, block_kr, block_ky, remarks = _searched_block(inputs, searched.kind)
-    model = _chosen_kind(searched.kind, block, displacement)
-    _reject_options_of_other_kinds(
-        model,
-        {
-            "--p2": "p2" in block,
-            "--map": full_map,
-            "--plot": plot is not None,
-            "--block": "block" in block,
-            "--rotation": rotation is not None,
-            "--displacement": displacement is not None,
-        },
-    )
+    if kind is not None and (why := facts_of(kind).no_search):
+        raise InputError(f"--kind {kind} has no critical value: {why}")
+    block, block_kr, block_ky, remarks = _searched_block(inputs, kind)
+    model = _chosen_kind(kind, block, displacement)
+    for word, name, is_given in (
+        ("--p2", "p2", "p2" in block),
+        ("--map", "full_map", full_map),
+        ("--plot", "full_map", plot is not None),
+        ("--block", "block", "block" in block),
+        ("--rotation", "rotation_deg", rotation is not None),
+        ("--displacement", "displacement_m", displacement is not None),
+    ):
+        if is_given and name not in model.search_options:
+            owners = [kind for kind, facts in KINDS.items() if name in facts.search_options]
+            raise InputError(f"{word} requires --kind {' or '.join(owners)}")
+    if model.search_needs == "p2" and not block:
+        raise InputError("--p2 is missing: the critical strength is computed for one p² [1/s²]")
     check_files(plot=plot)
-    ground, upward, about = find_shaking(motion, direction, db=db, reading=reading)
+    ground, upward, about = find_shaking(
+        motion, vertical, db=db, reading=reading, slope_azimuth_deg=slope_azimuth
+    )
     about += remarks
-    shaking: dict[str, Any] = {"vertical": upward, "polarity": direction.polarity}
+    shaking: dict[str, Any] = {"vertical": upward, "polarity": direction}
     say_when_compiling()
     if "displacement_m" in model.search_options:
         distances = (
@@ -104,7 +101,7 @@ def critical(
         with inputs.named():
             slides = _slides(ground, distances, about, kind=model.kind, **block, **shaking)
             slides = replace(slides, block_ky=block_ky)
-        print_result(slides, json=printing.json, verbose=printing.verbose)
+        print_result(slides, json=json, verbose=verbose)
         return
     settings: dict[str, Any] = {"rotation_deg": rotation, **block}
     if "full_map" in model.search_options:
@@ -116,22 +113,11 @@ def critical(
             response = respond(ground, kind=model.kind, p2=result.p2, kr=block_kr, **shaking)
             result = replace(result, block_kr=block_kr, block_outcome=response.outcome)
     if plot is not None:
-        from rbfrag.plots.islands import plot_islands
+        from rbfrag.plots.critical_strength import plot_islands
 
         plot_islands(ground, result, plot, vertical=upward, title=ground.label)
     result = replace(result, with_map=full_map, warnings=(*about, *result.warnings))
-    print_result(result, json=printing.json, verbose=printing.verbose)
-
-
-SEARCH_OPTION = {
-    "--p2": "p2",
-    "--map": "full_map",
-    "--plot": "full_map",
-    "--block": "block",
-    "--rotation": "rotation_deg",
-    "--displacement": "displacement_m",
-}
-"""What an option is called by the kinds that understand it."""
+    print_result(result, json=json, verbose=verbose)
 
 
 def _chosen_kind(kind: str | None, block: dict[str, Any], displacement: str | None) -> KindSpec:
@@ -153,18 +139,6 @@ def _chosen_kind(kind: str | None, block: dict[str, Any], displacement: str | No
     return kind_of_mode("topple" if displacement is None else "slide")
 
 
-def _reject_options_of_other_kinds(model: KindSpec, used_options: dict[str, bool]) -> None:
-    from rbfrag.solver.kinds import KINDS
-
-    for word, is_given in used_options.items():
-        if is_given and SEARCH_OPTION[word] not in model.search_options:
-            name = SEARCH_OPTION[word]
-            owners = [kind for kind, its in KINDS.items() if name in its.search_options]
-            raise InputError(f"{word} requires --kind {' or '.join(owners)}")
-    if model.search_needs == "p2" and not (used_options["--p2"] or used_options["--block"]):
-        raise InputError("--p2 is missing: the critical strength is computed for one p² [1/s²]")
-
-
 class SearchedBlock(NamedTuple):
     """Block whose strength a search is compared with.
 
@@ -181,16 +155,12 @@ class SearchedBlock(NamedTuple):
     warnings: tuple[str, ...] = ()
 
 
-def _searched_block(inputs: ParsedInputs, kind: str | None) -> SearchedBlock:
+def _searched_block(inputs: Inputs, kind: str | None) -> SearchedBlock:
     """Return the block of a search."""
     from rbfrag.question.classify import shape_of, without_kv
     from rbfrag.solver.kinds import PLANES, facts_of, kind_of_mode
-    from rbfrag.solver.stability.residual_strength import (
-        JOINT,
-        after_first_slip,
-        reject_before_slip,
-    )
-    from rbfrag.solver.stability.single import stability
+    from rbfrag.solver.stability.joint import JOINT
+    from rbfrag.solver.stability.single import after_first_slip, reject_before_slip, stability
 
     with inputs.named():
         shape = shape_of(without_kv(inputs))

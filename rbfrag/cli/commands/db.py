@@ -6,15 +6,15 @@ from typing import TYPE_CHECKING
 
 import typer
 
+from rbfrag.cli import options
+from rbfrag.cli.command import Commands, argument, option
 from rbfrag.cli.output import print_json, print_result, say_when_compiling
-from rbfrag.cli.parameters import options
-from rbfrag.cli.parameters.option_groups import argument, command_group, option, stacked
 from rbfrag.errors import InputError
 
 if TYPE_CHECKING:
     from rbfrag.results.result import Result
 
-app = command_group(
+app = Commands(
     "Upgrade, describe, check, export and merge databases, and import tables.",
     "Example:  rbfrag db info",
 )
@@ -23,7 +23,7 @@ app = command_group(
 @app.command("upgrade", epilog="Example:  rbfrag db upgrade --db old.db")
 def upgrade(db: options.Db = None, json: options.Json = False) -> None:
     """Upgrade a database to the current schema."""
-    from rbfrag.db.upgrade import upgrade_database
+    from rbfrag.db.engine import upgrade_database
 
     before, after = upgrade_database(db)
     if json:
@@ -35,7 +35,6 @@ def upgrade(db: options.Db = None, json: options.Json = False) -> None:
 
 
 @app.command("info", epilog="Example:  rbfrag db info --by suite")
-@stacked
 def info(
     *,
     db: options.Db = None,
@@ -58,7 +57,6 @@ def info(
 
 
 @app.command("check", epilog="Example:  rbfrag db check --sample 100 --seed 7")
-@stacked
 def check(
     *,
     db: options.Db = None,
@@ -85,7 +83,6 @@ def check(
 
 
 @app.command("export", epilog="Example:  rbfrag db export --out tables --tables motion,combination")
-@stacked
 def export(
     *,
     out: str = option(
@@ -95,7 +92,7 @@ def export(
     format: str = option("File format: parquet or csv", "parquet"),
     tables: str | None = option("Tables to export, separated by commas [default: all]"),
     arrays: bool = option("Include samples [g] and response histories (Parquet only)", False),
-    excel_text: bool = option(options.EXCEL_TEXT, False),
+    excel_text: options.ExcelText = False,
     json: options.Json = False,
 ) -> None:
     """Export the tables as Parquet or CSV, with a data dictionary."""
@@ -109,7 +106,6 @@ def export(
 
 
 @app.command("merge", epilog="Example:  rbfrag db merge theirs.db --db ours.db")
-@stacked
 def merge(
     *,
     other: str = argument(
@@ -123,13 +119,12 @@ def merge(
     Motions, suites, results and models are added. A second merge changes nothing. If the databases
     contradict each other, nothing is written.
     """
-    from rbfrag.db.merge.databases import merge_databases
+    from rbfrag.db.merge import merge_databases
 
     print_result(merge_databases(other, db=db), json=json)
 
 
 @app.command("import", epilog="Example:  rbfrag db import critical.csv --map map.toml")
-@stacked
 def import_(
     *,
     table: str = argument("CSV table with one critical value per line", metavar="TABLE.csv"),

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import typer
 
-from rbfrag.cli.parameters.option_groups import option, stacked
+from rbfrag.cli.command import option
 
 EXAMPLE = "Example:  rbfrag demo"
 
@@ -20,7 +20,6 @@ NEXT = (
 """Commands that are named at the end, with the extras that `make demo` installs."""
 
 
-@stacked
 def demo(*, context: typer.Context, folder: str = option("Output folder", ".")) -> None:
     """Run an example from records to a prediction.
 

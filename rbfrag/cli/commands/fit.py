@@ -2,56 +2,39 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
+from rbfrag.cli import options
+from rbfrag.cli.command import option
 from rbfrag.cli.output import print_result
-from rbfrag.cli.parameters import options
-from rbfrag.cli.parameters.option_groups import option, stacked
-from rbfrag.fragility.measures import TERMS, Term
+from rbfrag.fragility.measures import TERMS
 from rbfrag.vocabulary.quantities import word_of
 
 EXAMPLE = "Example:  rbfrag fit --term pgv"
 
 
-def _described(term: Term) -> str:
-    """Return the name of a term, with its formula where it has one of several measures."""
-    return f"{term.name} ({', '.join(map(word_of, term.inputs))})"
+TERM_LIST = "; ".join(
+    f"{term.name} ({', '.join(map(word_of, term.inputs))})" for term in TERMS.values()
+)
+"""The terms with the measures that each uses."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class Data:
-    """Data selection of the fit."""
-
-    suite: options.Suite = None
-    include_structures: bool = option(options.INCLUDE_STRUCTURES, False)
+def fit(
+    *,
+    term: str = option(
+        f"Set of intensity measures: {TERM_LIST}",
+        ...,
+        show_default=False,
+    ),
+    suite: options.Suite = None,
+    where: options.Where = None,
+    include_structures: options.IncludeStructures = False,
     vertical: str = option(
         "Combinations without or with vertical motion, or both: without, with, both", "without"
-    )
+    ),
     doubtful_pgd: bool = option(
         "For pgd_tm, use records flagged final_velocity or final_displacement, which are "
         "excluded by default",
         False,
-    )
-
-
-@dataclass(frozen=True, kw_only=True)
-class ModelOptions:
-    """Name and default of the stored model, and the seed of its bootstrap."""
-
-    name: str | None = option("Name of the model [default: METHOD-TERM]")
-    seed: int = option("Seed of the bootstrap by earthquake", 0)
-    replace: bool = option("Replace a stored model of the same name", False)
-
-
-@stacked
-def fit(
-    *,
-    term: str = option(
-        f"Set of intensity measures: {'; '.join(map(_described, TERMS.values()))}",
-        ...,
-        show_default=False,
     ),
-    data: Data,
     kind: str = option(
         "Kind of failure: toppling; slumping and confined_toppling, with pgv_pga and "
         "pgv_pga_m; sliding, with these, pgv and pgv_pga_ia; rocking (free-standing), with "
@@ -73,9 +56,22 @@ def fit(
     free_m: bool = option(
         "Estimate the exponent M of y = k_r g/p^M instead of M = 1 (lognormal, logistic)", False
     ),
-    stored: ModelOptions,
+    name: str | None = option("Name of the model [default: METHOD-TERM]"),
+    bootstrap: bool = option(
+        "Standard errors by a bootstrap of whole earthquakes, too [default: only with fewer than "
+        "10 earthquakes]",
+        False,
+    ),
+    dependence: bool = option(
+        "Dependence model of the blocks of one earthquake [default: estimated and stored by the "
+        "first joint question of the model]",
+        False,
+    ),
+    seed: int = option("Seed of the bootstrap and of the dependence model", 0),
+    replace: bool = option("Replace a stored model of the same name", False),
     db: options.Db = None,
-    printing: options.Printing,
+    verbose: options.Verbose = False,
+    json: options.Json = False,
 ) -> None:
     """Fit a fragility model to stored critical values or outcomes.
 
@@ -90,14 +86,17 @@ def fit(
         kind=kind,
         term=term,
         method=method,
-        suite=data.suite,
-        include_structures=data.include_structures,
-        vertical=data.vertical,  # type: ignore[arg-type]
-        name=stored.name,
-        seed=stored.seed,
+        suite=suite,
+        where=where,
+        include_structures=include_structures,
+        vertical=vertical,  # type: ignore[arg-type]
+        name=name,
+        seed=seed,
+        bootstrap=bootstrap,
+        dependence=dependence,
         estimate_m=free_m,
-        doubtful_pgd=data.doubtful_pgd,
+        doubtful_pgd=doubtful_pgd,
         rotation_deg=rotation,
-        replace=stored.replace,
+        replace=replace,
     )
-    print_result(report, json=printing.json, verbose=printing.verbose, fields=())
+    print_result(report, json=json, verbose=verbose, fields=())

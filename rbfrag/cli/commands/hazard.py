@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Annotated, cast
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import TYPE_CHECKING, Annotated, Any, cast
 
-from rbfrag.cli.commands.simulate import WorkerOptions
+from rbfrag.cli import options
+from rbfrag.cli.command import Fields, Inputs, argument, option
+from rbfrag.cli.inputs import BlocksOrRockMass
 from rbfrag.cli.output import OPTION_FIELDS, check_files, print_result, write_table
-from rbfrag.cli.parameters import options
-from rbfrag.cli.parameters.block import BlocksOptions
-from rbfrag.cli.parameters.option_groups import ParsedInputs, argument, fields_of, option, stacked
 from rbfrag.errors import InputError
 from rbfrag.results.diagnostic import diagnostics
 from rbfrag.vocabulary.quantities import BLOCK, COMMON
 
 if TYPE_CHECKING:
     from rbfrag.hazards.curve import CurveKeywords
+    from rbfrag.hazards.hazard_answer import HazardAnswer
     from rbfrag.question.fields import AnsweringFields
 
 EXAMPLE = (
@@ -23,41 +24,6 @@ EXAMPLE = (
 )
 
 
-@dataclass(frozen=True, kw_only=True)
-class RateOptions:
-    """Options of the annual rates."""
-
-    years: float = option("Exposure time of the probability [years]", 50.0)
-    weights: str | None = option(
-        "Weights of the logic-tree branches in the order of the curves, such as 0.5,0.3,0.2, "
-        "or the realizations file of OpenQuake"
-    )
-    joint: bool = option(
-        "Compute also the rate of earthquakes in which at least one of several blocks at a "
-        "site fails",
-        False,
-    )
-    within_km: float = option(options.WITHIN_HELP, options.WITHIN_KM)
-    at_least: str | None = option(
-        "Numbers of failures K for rates of earthquakes with at least K failures, such as "
-        "1,5,20, with --joint [default: 1, 2, 5, 10, …]",
-        metavar="K,K",
-    )
-
-    def counts(self) -> list[int] | None:
-        """Return the numbers of failures at a site whose rates are requested."""
-        if self.at_least is None:
-            return None
-        try:
-            return [int(part) for part in self.at_least.split(",")]
-        except ValueError:
-            raise InputError(
-                f"--at-least {self.at_least!r}: give whole numbers separated by commas, such as "
-                "1,5,20"
-            ) from None
-
-
-@stacked
 def hazard(
     *,
     curve: list[str] = argument(
@@ -66,12 +32,25 @@ def hazard(
         "logic tree",
         metavar="CURVE...",
     ),
-    inputs: Annotated[ParsedInputs, fields_of(*BLOCK, *COMMON)],
-    blocks: BlocksOptions,
+    inputs: Annotated[Inputs, Fields(*BLOCK, *COMMON)],
+    blocks: BlocksOrRockMass,
     meaning: options.Curve,
     answering: options.Answering,
-    rate_options: RateOptions,
-    workers: WorkerOptions,
+    years: float = option("Exposure time of the probability [years]", 50.0),
+    weights: options.Weights = None,
+    joint: bool = option(
+        "Compute also the rate of earthquakes in which at least one of several blocks at a "
+        "site fails",
+        False,
+    ),
+    within_km: options.WithinKm = options.WITHIN_KM,
+    at_least: str | None = option(
+        "Numbers of failures K for rates of earthquakes with at least K failures, such as "
+        "1,5,20, with --joint [default: 1, 2, 5, 10, …]",
+        metavar="K,K",
+    ),
+    jobs: options.Jobs = None,
+    scheduler: options.Scheduler = None,
     out: str | None = option(
         "Output table with one row per block and site (.csv, .xlsx, .parquet)"
     ),
@@ -80,11 +59,12 @@ def hazard(
         "tools (.csv, .xlsx, .parquet)",
         metavar="FILE",
     ),
-    excel_text: bool = option(options.EXCEL_TEXT, False),
+    excel_text: options.ExcelText = False,
     plot: str | None = option(
         "Figure of the disaggregation of the rate of a single block by intensity (.png, .pdf, .svg)"
     ),
-    printing: options.Printing,
+    verbose: options.Verbose = False,
+    json: options.Json = False,
 ) -> None:
     """Print annual rate and return period of failure of blocks.
 
@@ -98,30 +78,34 @@ def hazard(
     """
     import numpy as np
 
-    from rbfrag.exchange.release import RELEASE, SIDES, release_columns
-    from rbfrag.exchange.site_rates import blocks_at_sites, numbers_of_dry, rate_columns
+    from rbfrag.exchange.nearest_site import blocks_at_sites
+    from rbfrag.exchange.rate_tables import RELEASE, SIDES, rate_columns, release_columns
     from rbfrag.fragility import describe
-    from rbfrag.fragility.invalid_rows import FROM_SUMS
+    from rbfrag.fragility.validation import FROM_SUMS
     from rbfrag.hazards.branches import branch_weights
-    from rbfrag.hazards.curve_file import suited_in
-    from rbfrag.hazards.hazard_rates import hazard_at_sites
+    from rbfrag.hazards.curve_file import select_curves
+    from rbfrag.hazards.hazard_rates import hazard_at_sites, with_drained_rates
     from rbfrag.hazards.rate_integration import rate_part
     from rbfrag.question.classify import numbers_in
-    from rbfrag.question.question import is_wet, no_drained_bound, without_water
+    from rbfrag.question.drained_bound import is_wet, without_water
 
     check_files(table=out, plot=plot, excel_text=excel_text)
     check_files(table=release)
-    table, is_class, remarks, rows = blocks.collect_blocks(inputs, reads=(*RELEASE, "count"))
+    try:
+        counts = None if at_least is None else [int(part) for part in at_least.split(",")]
+    except ValueError:
+        raise InputError(
+            f"--at-least {at_least!r}: give whole numbers separated by commas, such as 1,5,20"
+        ) from None
+    table, is_class, remarks, rows = blocks.collect(inputs, reads=(*RELEASE, "count"))
     if release is not None and is_class:
         raise InputError(
             "--release requires the coordinates of blocks: use --blocks instead of --rockmass"
         )
     if rows is None:
         table = {**{name: [inputs[name]] for name in SIDES if name in inputs}, **table}
-    files = [suited_in(path, **vars(meaning)) for path in curve]
-    at = blocks_at_sites(
-        files, table, site_chosen=meaning.site is not None, within_km=rate_options.within_km
-    )
+    files = [select_curves(path, **meaning) for path in curve]
+    at = blocks_at_sites(files, table, site_chosen=meaning["site"] is not None, within_km=within_km)
     if rows is not None:
         of_none = np.isin(np.arange(rows.blocks["row"].size), [*at.missing])
         rows = rows.without(of_none, at.missing.__getitem__)
@@ -130,31 +114,30 @@ def hazard(
         raise InputError(
             "--plot requires a single block at a single site: give --site, --p2 and --kr"
         )
-    elsewhere = workers.scheduler is not None or (workers.jobs or 1) > 1
-    run = workers.runner(rate_part) if elsewhere else None
-    answer = hazard_at_sites(
-        at.sites, at.site, at.inputs, cast("CurveKeywords", vars(meaning)),
-        cast("AnsweringFields", answering),
-        weight=branch_weights(rate_options.weights, at.sites[0]), joint=rate_options.joint,
-        at_least=rate_options.counts(), years=rate_options.years, one_class=is_class,
-        count=None if is_class else at.columns.get("count"), run=run,
+    elsewhere = scheduler is not None or (jobs or 1) > 1
+    run = options.runner(rate_part, jobs, scheduler) if elsewhere else None
+    weight = branch_weights(weights, at.sites[0])
+
+    def rates_of(block_inputs: Mapping[str, Any], **together: Any) -> HazardAnswer:
+        return hazard_at_sites(
+            at.sites, at.site, block_inputs, cast("CurveKeywords", meaning),
+            cast("AnsweringFields", answering), weight=weight, years=years, run=run,
+            **together,
+        )  # fmt: skip
+
+    def drained_rates() -> HazardAnswer:
+        dry_inputs = Inputs(without_water(inputs))
+        dry = blocks.collect(dry_inputs, reads=(*RELEASE, "count"), dry=True)
+        return rates_of(at.inputs_of(dry.columns if dry.rows is None else dry.rows.columns))
+
+    answer = rates_of(
+        at.inputs, joint=joint, at_least=counts, one_class=is_class,
+        count=None if is_class else at.columns.get("count"),
     )  # fmt: skip
-    if is_wet(inputs) if rows is None else rows.wet is not None:
-        try:
-            dry = blocks.collect_blocks(
-                ParsedInputs(without_water(inputs)), reads=(*RELEASE, "count"), dry=True
-            )
-            bound = hazard_at_sites(
-                at.sites, at.site, numbers_of_dry(dry.columns, at),
-                cast("CurveKeywords", vars(meaning)), cast("AnsweringFields", answering),
-                years=rate_options.years, run=run,
-            )  # fmt: skip
-            drained = bound.annual_rate
-            if rows is not None and rows.wet is not None:
-                drained = np.where(rows.wet[at.columns["row"]], drained, np.nan)
-            answer = replace(answer, drained=drained)
-        except InputError as error:
-            remarks += (no_drained_bound(error),)
+    if rows is None and is_wet(inputs):
+        answer = with_drained_rates(answer, drained_rates, True)
+    elif rows is not None and rows.wet is not None:
+        answer = with_drained_rates(answer, drained_rates, rows.wet[at.columns["row"]])
     answer = replace(
         answer, names=tuple(at.names), rejected={} if rows is None else rows.rejected_by_row(),
         warnings=diagnostics(remarks, at.remarks, answer.warnings),
@@ -173,4 +156,4 @@ def hazard(
 
         plot_contribution(at.sites[0][0], answer, plot)
     fields = OPTION_FIELDS if rows is None else ()  # notes on a table name its columns
-    print_result(answer, json=printing.json, verbose=printing.verbose, fields=fields)
+    print_result(answer, json=json, verbose=verbose, fields=fields)

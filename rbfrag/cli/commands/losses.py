@@ -2,96 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
-from rbfrag.cli.commands.simulate import WorkerOptions
+from rbfrag.cli import options
+from rbfrag.cli.command import argument, option
 from rbfrag.cli.output import ProgressBar, check_files, print_result, write_table
-from rbfrag.cli.parameters import options
-from rbfrag.cli.parameters.option_groups import argument, option, stacked
 
 EXAMPLE = "Example:  rbfrag losses FOLDER --blocks blocks.csv --component rotd50 --out events.csv"
 
 
-@dataclass(frozen=True, kw_only=True)
-class JobFileOptions:
-    """Export files of one OpenQuake job."""
-
-    gmf_data: str | None = option(
-        "Ground-motion fields, CSV or HDF5 (gmf-data, which also names the sites)",
-        metavar="FILE",
-    )
-    events: str | None = option("Events file", metavar="FILE")
-    sitemesh: str | None = option("Site mesh file", metavar="FILE")
-    realizations: str | None = option(
-        "Realizations file with the logic-tree weights", metavar="FILE"
-    )
-    ruptures: str | None = option(
-        "Ruptures file, with the investigation time in its first line", metavar="FILE"
-    )
-
-    def named(self) -> dict[str, str]:
-        """Return the named files by their content."""
-        return {name: path for name, path in vars(self).items() if path is not None}
-
-
-@dataclass(frozen=True, kw_only=True)
-class Time:
-    """Duration of the event set, if no file of ruptures gives it."""
-
-    investigation_time: float | None = option(
-        "Investigation time of one stochastic event set [years], as in job.ini, if no "
-        "ruptures file gives it"
-    )
-    ses: int | None = option(
-        "Number of stochastic event sets per realization (ses_per_logic_tree_path), as in "
-        "job.ini, if no ruptures file gives it"
-    )
-
-
-@dataclass(frozen=True, kw_only=True)
-class Sampling:
-    """Sampling of the blocks of one event."""
-
-    samples: int = option("Number of samples per event", 100)
-    expected: bool = option("Expected values only, without samples and curves", False)
-    seed: int = option("Seed of the samples", 0)
-
-
-@dataclass(frozen=True, kw_only=True)
-class Meaning:
-    """Interpretation of the shaking and kind of failure of the blocks."""
-
-    imt: str | None = option(
-        "Intensity measure: PGV, 'SA(1.0)', or PGA, converted to PGV with the magnitudes of "
-        "the ruptures; several (PGV,PGA) with their --model, sampled independently by "
-        "OpenQuake [default: PGV, else SA(1.0), as available]"
-    )
-    component: str | None = option(
-        "Horizontal component of the intensity measures: single, geometric_mean, rotd50, "
-        "rotd100 or larger [default: rotd50]"
-    )
-    kind: str | None = option(
-        "Kind of failure of rows without one [default: toppling, backed by a rock face]"
-    )
-
-
-@dataclass(frozen=True, kw_only=True)
-class LossTable:
-    """Table of blocks."""
-
-    blocks: str = option(
-        "Table of blocks (.csv, .xlsx, .parquet) with p2_1_s2 [1/s²] and kr, or height_m and "
-        "width_m [m]; site_id or lon and lat; optional count, weight, loss, loss_sigma, kind",
-        ...,
-        metavar="FILE",
-    )
-    sheet: str | None = option(options.SHEET, metavar="NAME")
-    ignore_columns: str | None = option(options.IGNORE_COLUMNS, metavar="NAME,NAME")
-    crs: str | None = option(options.CRS)
-    within_km: float = option(options.WITHIN_HELP, options.WITHIN_KM)
-
-
-@stacked
 def losses(
     *,
     folder: str | None = argument(
@@ -100,19 +17,61 @@ def losses(
         None,
         metavar="[FOLDER]",
     ),
-    table: LossTable,
-    files: JobFileOptions,
-    time: Time,
-    sampling: Sampling,
-    meaning: Meaning,
-    workers: WorkerOptions,
+    blocks: str = option(
+        "Table of blocks (.csv, .xlsx, .parquet) with p2_1_s2 [1/s²] and kr, or height_m and "
+        "width_m [m]; site_id or lon and lat; optional count, weight, loss, loss_sigma, kind",
+        ...,
+        metavar="FILE",
+    ),
+    sheet: options.Sheet = None,
+    ignore_columns: options.IgnoreColumns = None,
+    crs: options.Crs = None,
+    within_km: options.WithinKm = options.WITHIN_KM,
+    gmf_data: str | None = option(
+        "Ground-motion fields, CSV or HDF5 (gmf-data, which also names the sites)",
+        metavar="FILE",
+    ),
+    events: str | None = option("Events file", metavar="FILE"),
+    sitemesh: str | None = option("Site mesh file", metavar="FILE"),
+    realizations: str | None = option(
+        "Realizations file with the logic-tree weights", metavar="FILE"
+    ),
+    ruptures: str | None = option(
+        "Ruptures file, with the investigation time in its first line", metavar="FILE"
+    ),
+    investigation_time: float | None = option(
+        "Investigation time of one stochastic event set [years], as in job.ini, if no "
+        "ruptures file gives it"
+    ),
+    ses: int | None = option(
+        "Number of stochastic event sets per realization (ses_per_logic_tree_path), as in "
+        "job.ini, if no ruptures file gives it"
+    ),
+    samples: int = option("Number of samples per event", 100),
+    expected: bool = option("Expected values only, without samples and curves", False),
+    seed: int = option("Seed of the samples", 0),
+    imt: str | None = option(
+        "Intensity measure: PGV, 'SA(1.0)', or PGA, converted to PGV with the magnitudes of "
+        "the ruptures; several (PGV,PGA) with their --model, sampled independently by "
+        "OpenQuake [default: PGV, else SA(1.0), as available]"
+    ),
+    component: str | None = option(
+        "Horizontal component of the intensity measures: single, geometric_mean, rotd50, "
+        "rotd100 or larger [default: rotd50]"
+    ),
+    kind: str | None = option(
+        "Kind of failure of rows without one [default: toppling, backed by a rock face]"
+    ),
+    jobs: options.Jobs = None,
+    scheduler: options.Scheduler = None,
     answering: options.Answering,
     out: str | None = option("Output table of events (.csv, .xlsx, .parquet)"),
-    excel_text: bool = option(options.EXCEL_TEXT, False),
+    excel_text: options.ExcelText = False,
     plot: str | None = option(
         "Figure of exceedance rates of the number of failures (.png, .pdf, .svg)"
     ),
-    printing: options.Printing,
+    verbose: options.Verbose = False,
+    json: options.Json = False,
 ) -> None:
     """Compute failures and losses of blocks in an event set.
 
@@ -129,22 +88,25 @@ def losses(
 
     check_files(table=out, plot=plot, excel_text=excel_text)
     rows = read_blocks(
-        table.blocks, meaning.kind, reads=(*PLACE, *PORTFOLIO), sheet=table.sheet,
-        ignore_columns=options.column_names(table.ignore_columns), crs=table.crs,
+        blocks, kind, reads=(*PLACE, *PORTFOLIO), sheet=sheet,
+        ignore_columns=options.column_names(ignore_columns), crs=crs,
     )  # fmt: skip
+    files = {
+        "gmf_data": gmf_data, "events": events, "sitemesh": sitemesh,
+        "realizations": realizations, "ruptures": ruptures,
+    }  # fmt: skip
     with ProgressBar("losses", "events") as bar:
         answer = answered(
-            folder, rows, files=files.named(), samples=sampling.samples,
-            expected=sampling.expected, seed=sampling.seed,
-            investigation_time=time.investigation_time, ses=time.ses,
-            imt=None if meaning.imt is None else meaning.imt.split(","),
-            component=meaning.component, kind=meaning.kind, within_km=table.within_km,
-            **answering, run=workers.runner(count_years), on_progress=bar.show,
+            folder, rows, files={name: path for name, path in files.items() if path is not None},
+            samples=samples, expected=expected, seed=seed, investigation_time=investigation_time,
+            ses=ses, imt=None if imt is None else imt.split(","), component=component, kind=kind,
+            within_km=within_km, **answering, run=options.runner(count_years, jobs, scheduler),
+            on_progress=bar.show,
         )  # fmt: skip
     if out is not None:
         write_table(answer.table_columns(), out, excel_text=excel_text, notes=answer.warnings)
     if plot is not None:
-        from rbfrag.plots.losses import plot_losses
+        from rbfrag.plots.hazard import plot_losses
 
         plot_losses(answer, plot)
-    print_result(answer, json=printing.json, verbose=printing.verbose, fields=())
+    print_result(answer, json=json, verbose=verbose, fields=())

@@ -6,12 +6,11 @@ from typing import Annotated
 
 import typer
 
+from rbfrag.cli import options
+from rbfrag.cli.command import Commands, argument, model_names
 from rbfrag.cli.output import print_result
-from rbfrag.cli.parameters import options
-from rbfrag.cli.parameters.completion import model_names
-from rbfrag.cli.parameters.option_groups import argument, command_group, stacked
 
-app = command_group(
+app = Commands(
     "List, show and choose fitted fragility models.", "Example:  rbfrag models show logistic-pgv"
 )
 
@@ -29,16 +28,15 @@ def list_models(db: options.Db = None, json: options.Json = False) -> None:
     available, the default model is used, else the best. Models of methods for comparison are used
     by name only. Without a database the built-in models are listed.
     """
-    from rbfrag.fragility.model_list import ModelList
-    from rbfrag.fragility.model_selection import stored_rows
+    from rbfrag.fragility.model_selection import ModelList, stored_rows
 
     print_result(ModelList(stored_rows(db)), json=json)
 
 
 @app.command("show", epilog="Example:  rbfrag models show logistic-pgv")
-@stacked
 def show_model(
-    printing: options.Printing,
+    verbose: options.Verbose = False,
+    json: options.Json = False,
     name: str | None = argument(
         "Name of the model [default: list all]",
         None,
@@ -49,7 +47,7 @@ def show_model(
 ) -> None:
     """Print the report of a fitted model, or the list of models."""
     if name is None:
-        list_models(db, json=printing.json)
+        list_models(db, json=json)
         return
     from rbfrag.fragility.fit.report import FitReport
     from rbfrag.fragility.model import FragilityModel
@@ -57,7 +55,7 @@ def show_model(
 
     row = stored_row(name, db)
     report = FitReport.from_model(FragilityModel.from_row(row))
-    print_result(report, json=printing.json, verbose=printing.verbose, fields=())
+    print_result(report, json=json, verbose=verbose, fields=())
 
 
 @app.command("default", epilog="Example:  rbfrag models default logistic-pgv")
@@ -72,7 +70,7 @@ def set_default_model(name: Name, db: options.Db = None) -> None:
     if built_in:
         raise InputError(
             f"the built-in data set is read-only: use --model {name}, or copy {place} to "
-            "rbfrag.db, run  rbfrag db upgrade  and set the default there"
+            "rbfrag.db and set the default there"
         )
     with opened_database(db) as engine, engine.begin() as connection:
         set_default(connection, name)
@@ -87,7 +85,7 @@ def check(db: options.Db = None, json: options.Json = False) -> None:
     """
     from rbfrag.db.engine import opened_database
     from rbfrag.db.models import model_rows
-    from rbfrag.fragility.fit.check import check_models
+    from rbfrag.fragility.fit.stored import check_models
 
     with opened_database(db, read_only=True) as engine, engine.connect() as connection:
         checks = check_models(connection, model_rows(connection))

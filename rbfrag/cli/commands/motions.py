@@ -8,43 +8,50 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from rbfrag.cli.output import ProgressBar, print_json, print_result, print_table
-from rbfrag.cli.parameters import options
-from rbfrag.cli.parameters.motion import find_motion, stored_row
-from rbfrag.cli.parameters.option_groups import argument, command_group, option, stacked
+from rbfrag.cli import options
+from rbfrag.cli.command import Commands, argument, option
+from rbfrag.cli.inputs import find_horizontals, find_motion, stored_peaks, stored_row
+from rbfrag.cli.output import ProgressBar, check_files, print_json, print_result, print_table
 from rbfrag.results.numbers import count_of
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from rbfrag.db.rows import MotionRow
+    from rbfrag.motions.response_spectrum import DirectionalPeaks
 
 WIDTH = 100
 """Characters of a line of the list."""
 
+METADATA = (
+    "magnitude", "mechanism", "depth_km", "network", "lat", "lon", "rjb_km", "rrup_km", "repi_km",
+    "vs30_m_s", "attributes",
+)  # fmt: skip
 STORED_LABELS = (
-    "id", "event_id", "event_guessed", "magnitude", "is_vertical", "processing", "flags",
+    "id", "event_id", "event_guessed", *METADATA, "is_vertical", "processing", "flags",
 )  # fmt: skip
 """What the database knows of a motion better than its samples do."""
 
-app = command_group(
-    "Add, list, show and export accelerograms.",
+app = Commands(
+    "Add, list, show, rotate and export accelerograms.",
     "Example:  rbfrag motions add records/ --metadata records/META.csv",
 )
 
 
 @app.command("add", epilog="Example:  rbfrag motions add records/ --metadata records/META.csv")
-@stacked
 def add(
     *,
     paths: list[str] = argument(
         "Files, zip archives, members of one (FILE.zip/NAME), or folders to search",
         metavar="PATHS...",
     ),
-    reading: options.ReadingOptions,
+    reading: options.Reading,
     suite: str | None = option("Suite that the motions are added to"),
     metadata: str | None = option(
         "Table with the columns file (required), trace_index, event_id, units, is_vertical, "
-        "companion_group, magnitude, processing; file names are relative to the folder of "
-        "the table",
+        "companion_group, magnitude, processing, mechanism, depth_km, station, network, lat, "
+        "lon, rjb_km, rrup_km, repi_km, vs30_m_s; further columns are stored as attributes of "
+        "the recording; file names are relative to the folder of the table",
         metavar="CSV",
     ),
     processing: str = option(
@@ -78,12 +85,10 @@ def add(
             db=db,
             suite=suite,
             metadata=metadata,
-            units=reading.units,
-            dt_s=reading.dt,
             processing=processing,
             raw=raw,
             allow_partial=allow_partial,
-            gain=reading.gain,
+            **reading,
             on_file=bar.show,
         )
     print_result(report, json=json)
@@ -117,61 +122,82 @@ def list_motions(
         f"here, {flagged} with a quality flag."
     )
     print()
+    shown = {
+        label: [getattr(row, name) for row in rows]
+        for label, name in (
+            ("M", "magnitude"), ("R_JB [km]", "rjb_km"), ("Vs30 [m/s]", "vs30_m_s")
+        )
+    }  # fmt: skip
+    metadata = {label: cells for label, cells in shown.items() if set(cells) != {None}}
     print_table(
-        ("id", "motion", "event", "vert.", "dt [s]", "PGA [g]", "PGV [m/s]", "Tm [s]",
+        ("id", "motion", "event", *metadata, "vert.", "dt [s]", "PGA [g]", "PGV [m/s]", "Tm [s]",
          "processed", "flags"),
         [
-            (row.id, row.name, row.event_id, row.is_vertical, row.dt_s, round(row.pga_g, 4),
-             round(row.pgv_m_s, 4), None if row.tm_s is None else round(row.tm_s, 3),
+            (row.id, row.name, row.event_id, *cells, row.is_vertical, row.dt_s,
+             round(row.pga_g, 4), round(row.pgv_m_s, 4),
+             None if row.tm_s is None else round(row.tm_s, 3),
              row.processing_applied is not None, row.flags)
-            for row in rows
+            for row, *cells in zip(rows, *metadata.values(), strict=True)
         ],
         width=WIDTH,
     )  # fmt: skip
 
 
 @app.command("show", epilog="Example:  rbfrag motions show record.AT2")
-@stacked
 def show(
     motion: options.Motion,
-    reading: options.ReadingOptions,
+    reading: options.Reading,
+    plot: str | None = option(
+        "Figure of the response spectrum, with RotD50 and RotD100 of a stored recording (.png, "
+        ".pdf, .svg)",
+        metavar="FILE",
+    ),
     allow_partial: options.AllowPartial = False,
     db: options.Db = None,
     *,
-    printing: options.Printing,
+    verbose: options.Verbose = False,
+    json: options.Json = False,
 ) -> None:
-    """Show one motion: a file as it is, or a stored one by its id."""
-    from rbfrag.motions.motion_summary import MotionSummary
+    """Show one motion with its intensity measures: a file as it is, or a stored one by its id."""
+    from rbfrag.motions.quality import MotionSummary
+
+    check_files(plot=plot)
 
     ground = find_motion(motion, db=db, reading=reading, allow_partial=allow_partial)
     values: dict[str, Any] = {}
+    recording: Sequence[DirectionalPeaks] = ()
     if (stored := stored_row(motion, db=db)) is not None:
         row, pair = stored
         document = _as_dict(row)
         values = {name: document[name] for name in STORED_LABELS}
         values["vertical_id"] = None if pair is None else pair.vertical_id
         values["vertical_remark"] = None if pair is None else pair.reason or pair.remark or None
-    print_result(MotionSummary(ground, values), json=printing.json, verbose=printing.verbose)
+        recording = stored_peaks(row.id, db=db)
+    if plot is not None:
+        from rbfrag.plots.response_spectrum import plot_response_spectrum
+
+        plot_response_spectrum(ground, plot, recording=recording)
+    print_result(MotionSummary(ground, values, recording), json=json, verbose=verbose)
 
 
 @app.command("export", epilog="Example:  rbfrag motions export 1 2 --out two.csv")
-@stacked
 def export(
     *,
     motions: options.Motions,
-    reading: options.ReadingOptions,
+    reading: options.Reading,
     out: str = option("Output file", ..., metavar="FILE"),
     file_format: str | None = option(
         "File format: csv (several motions, all labels) or at2 (one motion) [default: from "
         "the suffix of FILE]",
-        word="--format",
+        None,
+        "--format",
     ),
     allow_partial: options.AllowPartial = False,
     db: options.Db = None,
     json: options.Json = False,
 ) -> None:
     """Export motions to a file, without loss of precision."""
-    from rbfrag.motions.export import export_motions
+    from rbfrag.motions.readers import export_motions
 
     records = [
         find_motion(text, db=db, reading=reading, allow_partial=allow_partial) for text in motions
@@ -185,7 +211,49 @@ def export(
     print(out)
 
 
+@app.command("rotate", epilog="Example:  rbfrag motions rotate 1 --azimuth 120 --out az120.csv")
+def rotate(
+    *,
+    motions: options.Motions,
+    reading: options.Reading,
+    azimuth: float = option(
+        "Azimuth of the positive direction, clockwise from north [deg]", ..., metavar="DEG"
+    ),
+    out: str | None = option(
+        "Output file (.csv, .at2) [default: the database, in the recordings of the motions]",
+        metavar="FILE",
+    ),
+    suite: str | None = option("Suite that the rotated motions are added to"),
+    db: options.Db = None,
+    json: options.Json = False,
+) -> None:
+    """Rotate the two horizontal components of recordings to an azimuth.
+
+    MOTION is one of the two: the other is that of the same recording or file. Their orientations
+    must be known and at least 30 deg apart, sampling interval and start equal, and lengths within
+    5 %. In the database the component is called az120 for 120 deg.
+    """
+    if out is None:
+        from rbfrag.campaign.rotate_motions import rotate_motions
+
+        print_result(rotate_motions(motions, azimuth, db=db, suite=suite), json=json)
+        return
+    from rbfrag.motions.readers import export_motions
+    from rbfrag.motions.rotation import rotate as rotate_pair
+
+    pairs = [find_horizontals(text, db=db, reading=reading) for text in motions]
+    records = [rotate_pair(*pair, azimuth) for pair in pairs]
+    written = export_motions(records, out)
+    if json:
+        print_json(
+            {"file": out, "format": written, "sha256": [motion.sha256 for motion in records]}
+        )
+        return
+    print(out)
+
+
 def _as_dict(row: MotionRow) -> dict[str, Any]:
     document = asdict(row)
     document["flags"] = list(row.flags)
+    document["attributes"] = dict(row.attributes)
     return document

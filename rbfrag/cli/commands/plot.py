@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Annotated, Any
 
 import typer
 
+from rbfrag.cli import options
+from rbfrag.cli.command import Commands, Fields, Inputs, option
+from rbfrag.cli.inputs import charted_blocks, find_motion, find_shaking, numbers_of
 from rbfrag.cli.output import (
     ProgressBar,
     print_json,
@@ -14,20 +16,19 @@ from rbfrag.cli.output import (
     print_warnings,
     say_when_compiling,
 )
-from rbfrag.cli.parameters import options
-from rbfrag.cli.parameters.block import numbers_of
-from rbfrag.cli.parameters.motion import find_motion, find_shaking
-from rbfrag.cli.parameters.option_groups import (
-    ParsedInputs,
-    command_group,
-    fields_of,
-    option,
-    stacked,
-)
 from rbfrag.errors import InputError
-from rbfrag.vocabulary.quantities import COMMON, JOINT, PLANES, SHAPE, SPACE
+from rbfrag.vocabulary.quantities import (
+    BLOCK,
+    COMMON,
+    JOINT,
+    MEASURED,
+    PLANES,
+    REQUEST,
+    SHAPE,
+    SPACE,
+)
 
-app = command_group(
+app = Commands(
     "Draw models, data, spectra, responses and failure modes.",
     "Example:  rbfrag plot fit --out fit.png",
 )
@@ -35,23 +36,7 @@ app = command_group(
 Out = Annotated[str, typer.Option("--out", help="Output file (.png, .pdf, .svg)")]
 
 
-@dataclass(frozen=True, kw_only=True)
-class Held:
-    """Fixed variables of lines of equal probability."""
-
-    p2: float | None = option(
-        "Frequency parameter p² of the blocks [1/s²] [default: middle of the fitted range]"
-    )
-    pga: float | None = option(
-        "PGA of the motions [g] [default: proportional to PGV, from the middle of the fitted range]"
-    )
-    tm: float | None = option(
-        "Mean period of the motions [s] [default: middle of the fitted range]"
-    )
-
-
 @app.command("fit", epilog="Example:  rbfrag plot fit --model logistic-pgv --out fit.png")
-@stacked
 def plot_fit(
     *,
     out: Out,
@@ -71,11 +56,18 @@ def plot_fit(
 
 
 @app.command("chart", epilog="Example:  rbfrag plot chart --p2 3 --out chart.pdf")
-@stacked
 def plot_chart(
     *,
     out: Out,
-    held: Held,
+    p2: float | None = option(
+        "Frequency parameter p² of the blocks [1/s²] [default: middle of the fitted range]"
+    ),
+    pga: float | None = option(
+        "PGA of the motions [g] [default: proportional to PGV, from the middle of the fitted range]"
+    ),
+    tm: float | None = option(
+        "Mean period of the motions [s] [default: middle of the fitted range]"
+    ),
     model: str | None = option(
         "Name of a model with a single intensity measure (PGV, SA(1), PGA, ...) or PGV with "
         "PGA (and Tm); any model of kinds other than toppling [default: model used for PGV]"
@@ -95,9 +87,9 @@ def plot_chart(
     plot.chart(
         out,
         model=model,
-        p2=held.p2,
-        pga_g=held.pga,
-        tm_s=held.tm,
+        p2=p2,
+        pga_g=pga,
+        tm_s=tm,
         displacement_m=displacement,
         db=db,
     )
@@ -107,7 +99,6 @@ def plot_chart(
 @app.command(
     "curve", epilog="Example:  rbfrag plot curve --height 2.4 --width 0.5 --pga 0.4 --out curve.png"
 )
-@stacked
 def plot_curve(
     *,
     out: Out,
@@ -135,7 +126,7 @@ def plot_curve(
     def published(measure: str) -> Any:
         if compare is None:
             return {}
-        from rbfrag.exchange.other_fragilities import of_measure
+        from rbfrag.exchange.export import of_measure
 
         return of_measure(compare, measure)
 
@@ -146,20 +137,43 @@ def plot_curve(
     print(out)
 
 
-@app.command("sensitivity", epilog="Example:  rbfrag plot sensitivity --out sensitivity.png")
-def plot_sensitivity(out: Out, suite: options.Suite = None, db: options.Db = None) -> None:
+@app.command(
+    "sensitivity",
+    epilog="Example:  rbfrag plot sensitivity --height 2 --width .4 --phi 40 --pgv .9 --out s.png",
+)
+def plot_sensitivity(
+    *,
+    out: Out,
+    inputs: Annotated[Inputs, Fields(*BLOCK, *MEASURED, *COMMON)],
+    measures: options.Shaking,
+    request: Annotated[Inputs, Fields(*REQUEST, without=("sites",))],
+) -> None:
+    """Draw P of a block at usual errors of measurement, the longest bar at the top.
+
+    With --dip-sigma, --width-sigma etc. the distribution of P over the draws is drawn, too, with
+    its mean and its interval.
+    """
+    from rbfrag.plots import plot
+
+    with inputs.named():
+        picture = plot.sensitivity(out, **inputs, **measures, **request)
+    print_warnings(picture.warnings)
+    print(out)
+
+
+@app.command("critical", epilog="Example:  rbfrag plot critical --out critical.png")
+def plot_critical(out: Out, suite: options.Suite = None, db: options.Db = None) -> None:
     """Draw critical k_r/PGA over the frequency ratio.
 
     The frequency ratio is omega_m/p. The lines are those of single pulses.
     """
     from rbfrag.plots import plot
 
-    plot.sensitivity(out, suite=suite, db=db)
+    plot.critical(out, suite=suite, db=db)
     print(out)
 
 
 @app.command("calibration", epilog="Example:  rbfrag plot calibration --out calibration.png")
-@stacked
 def plot_calibration(
     *,
     out: Out,
@@ -190,12 +204,11 @@ def plot_vertical(out: Out, suite: options.Suite = None, db: options.Db = None) 
 
 
 @app.command("spectrum", epilog="Example:  rbfrag plot spectrum 1 5 --polarity both --out x.png")
-@stacked
 def plot_spectrum(
     *,
     motions: options.Motions,
     out: Out,
-    reading: options.ReadingOptions,
+    reading: options.Reading,
     p2: str = option("Minimum range of p² on the axis [1/s²]", "0.1,30"),
     polarity: options.Polarity = "both",
     db: options.Db = None,
@@ -214,13 +227,14 @@ def plot_spectrum(
 @app.command(
     "response", epilog="Example:  rbfrag plot response 1 --height 2 --width 0.4 --out a.png"
 )
-@stacked
 def plot_response(
     motion: options.Motion,
     out: Out,
-    inputs: Annotated[ParsedInputs, fields_of("p2", "kr", *SHAPE, *PLANES, *JOINT, *COMMON)],
+    inputs: Annotated[Inputs, Fields("p2", "kr", *SHAPE, *PLANES, *JOINT, *COMMON)],
+    vertical: options.Vertical = None,
+    *,
     direction: options.Direction,
-    reading: options.ReadingOptions,
+    reading: options.Reading,
     db: options.Db = None,
 ) -> None:
     """Draw the response history of a block.
@@ -232,11 +246,11 @@ def plot_response(
     from rbfrag.plots import plot
 
     _, numbers, about = numbers_of(inputs, TOPPLING_BLOCK.kind)
-    ground, upward, remarks = find_shaking(motion, direction, db=db, reading=reading)
+    ground, upward, remarks = find_shaking(motion, vertical, db=db, reading=reading)
     say_when_compiling()
     plot.response(
         ground, out, p2=numbers["p2"], kr=numbers["kr"], vertical=upward,
-        polarity=direction.polarity,
+        polarity=direction,
     )  # fmt: skip
     print_warnings([*about, *remarks])
     print(out)
@@ -246,10 +260,9 @@ def plot_response(
     "planes",
     epilog="Example:  rbfrag plot planes --base 25/102 --back 65/075 --face 70/090 --out a.png",
 )
-@stacked
 def plot_planes(
     *,
-    planes: Annotated[ParsedInputs, fields_of(*SPACE)],
+    planes: Annotated[Inputs, Fields(*SPACE)],
     out: Out,
 ) -> None:
     """Draw base, back and face of a block on a stereonet.
@@ -264,40 +277,33 @@ def plot_planes(
     print_warnings(picture.warnings)
 
 
-@dataclass(frozen=True, kw_only=True)
-class Ultimate:
-    """Ground motion for the simulation of the cells of a chart."""
-
-    ultimate: bool = option(
-        "Simulate the block of each 3° cell, with the spacing --s1 (default 1 m), to its end",
-        False,
-    )
-    motion: str | None = option("Accelerogram of --ultimate", metavar="MOTION")
-    jobs: options.Jobs = None
-
-
 @app.command(
     "modes",
     epilog="Example:  rbfrag plot modes --phi 40 --beta 20 --rockmass mass.toml --out a.png",
 )
-@stacked
 def plot_modes(
     *,
     planes: Annotated[
-        ParsedInputs,
-        fields_of(*PLANES, "back_fracture", "s1_m", *JOINT, "cohesion_pa", "density_kg_m3"),
+        Inputs,
+        Fields(*PLANES, "back_fracture", "s1_m", *JOINT, "cohesion_pa", "density_kg_m3"),
     ],
     out: Out,
-    ended: Ultimate,
+    ultimate: bool = option(
+        "Simulate the block of each 3° cell, with the spacing --s1 (default 1 m), to its end",
+        False,
+    ),
+    motion: str | None = option("Accelerogram of --ultimate", metavar="MOTION"),
+    jobs: options.Jobs = None,
+    vertical: options.Vertical = None,
     direction: options.Direction,
-    reading: options.ReadingOptions,
+    reading: options.Reading,
     db: options.Db = None,
     blocks: str | None = option(
         "Table of blocks to show (.csv, .xlsx, .parquet) with alpha1_deg and alpha3_deg, "
         "such as that of rbfrag rockmass --out",
         metavar="FILE",
     ),
-    sheet: str | None = option(options.SHEET, metavar="NAME"),
+    sheet: options.Sheet = None,
     rockmass: str | None = option("Rock mass file of blocks to show (.toml, .csv)", metavar="FILE"),
 ) -> None:
     """Draw failure modes and yield accelerations.
@@ -305,7 +311,6 @@ def plot_modes(
     The axes are the block angles alpha1 and alpha3. With water, cohesion or roughness the chart is
     for blocks of one spacing --s1. With --ultimate the colours are the final modes under --motion.
     """
-    from rbfrag.cli.parameters.block import charted_blocks
     from rbfrag.plots import plot
     from rbfrag.plots.canvas import plot_path
 
@@ -316,18 +321,18 @@ def plot_modes(
     plot_path(out)
     shown = charted_blocks(blocks, rockmass, planes, sheet=sheet)
     ran, warnings = None, [*shown.warnings]
-    if ended.ultimate != (ended.motion is not None):
+    if ultimate != (motion is not None):
         raise InputError("--ultimate requires --motion, and --motion requires --ultimate")
-    if ended.motion is not None:
-        from rbfrag.campaign.shake_rockmass import shake
+    if motion is not None:
+        from rbfrag.campaign.rock_mass_answer import shake
         from rbfrag.plots.modes import chart_cells
 
-        ground, upward, remarks = find_shaking(ended.motion, direction, db=db, reading=reading)
+        ground, upward, remarks = find_shaking(motion, vertical, db=db, reading=reading)
         say_when_compiling()
         with ProgressBar("plot modes", "cells") as bar:
             ran = shake(
-                chart_cells(**planes), ground, vertical=upward, polarity=direction.polarity,
-                jobs=ended.jobs, on_progress=lambda state: bar.show(state.completed, state.total),
+                chart_cells(**planes), ground, vertical=upward, polarity=direction,
+                jobs=jobs, on_progress=lambda state: bar.show(state.completed, state.total),
             )  # fmt: skip
         warnings += [*remarks, *ran.warnings]
     plot.modes(out, alpha1_deg=shown.alpha1_deg, alpha3_deg=shown.alpha3_deg, ended=ran, **planes)
@@ -340,11 +345,10 @@ def plot_modes(
     epilog="Example:  rbfrag plot rotation --alpha1 45 --alpha3 65 --r3 1 --beta 0 --phi 35 "
     "--out rotation.png",
 )
-@stacked
 def plot_rotation(
     *,
     out: Out,
-    inputs: Annotated[ParsedInputs, fields_of(*SHAPE, *PLANES, *COMMON, without=("kind",))],
+    inputs: Annotated[Inputs, Fields(*SHAPE, *PLANES, *COMMON, without=("kind",))],
     back_follows: str = option(
         "Rotations of the back plane as fractions of the block rotation, 0–1",
         "0,0.5,1",
@@ -356,8 +360,8 @@ def plot_rotation(
     The block slumps or topples with confinement. The minimum is printed. The rock behind the block
     may yield: the back plane then rotates by a fraction of the block rotation.
     """
-    from rbfrag.plots.rotation import plot_rotation as draw
-    from rbfrag.plots.rotation import yield_lines
+    from rbfrag.plots.modes import plot_rotation as draw
+    from rbfrag.plots.modes import yield_lines
     from rbfrag.question.classify import on_planes, without_kv
 
     with inputs.named():

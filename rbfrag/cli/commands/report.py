@@ -2,49 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from itertools import zip_longest
 from typing import Annotated, Any
 
-from rbfrag.cli.output import (
-    print_json,
-    print_pairs,
-    print_result,
-    print_rows,
-    print_warnings,
-)
-from rbfrag.cli.parameters import options
-from rbfrag.cli.parameters.option_groups import ParsedInputs, argument, fields_of, option, stacked
+from rbfrag.cli import options
+from rbfrag.cli.command import Fields, Inputs, argument, option
+from rbfrag.cli.output import print_json, print_pairs, print_result, print_rows, print_warnings
 from rbfrag.vocabulary.quantities import BLOCK, COMMON, REQUEST
 
 EXAMPLE = "Example:  rbfrag report --height 2.4 --width 0.5 --pgv 0.6 --out block.pdf"
 
 
-@dataclass(frozen=True, kw_only=True)
-class Heading:
-    """Title and date of a report."""
-
-    title: str | None = option("Title of the page [default: Seismic fragility of a rock block]")
-    date: str = option("Date on the page [default: none]", "")
-
-
-@dataclass(frozen=True, kw_only=True)
-class Hazard:
-    """Hazard curve and period of the annual failure rate."""
-
-    hazard: list[str] | None = option(
-        "Hazard curve as in rbfrag hazard, for the return period of failure; once for each "
-        "branch of a logic tree",
-        metavar="CURVE",
-    )
-    weights: str | None = option(
-        "Weights of the logic-tree branches in the order of the curves, such as 0.5,0.3,0.2, "
-        "or the realizations file of OpenQuake"
-    )
-    years: float = option("Exposure time of the probability [years]", 50.0)
-
-
-@stacked
 def report(
     *,
     blocks: str | None = argument(
@@ -53,15 +21,22 @@ def report(
         None,
         metavar="[BLOCKS]",
     ),
-    sheet: str | None = option(options.SHEET, metavar="NAME"),
-    ignore_columns: str | None = option(options.IGNORE_COLUMNS, metavar="NAME,NAME"),
+    sheet: options.Sheet = None,
+    ignore_columns: options.IgnoreColumns = None,
     out: str = option("Output file: .pdf or .png (A4 page), or .html (single file)", ...),
-    block_inputs: Annotated[ParsedInputs, fields_of(*BLOCK, *COMMON)],
+    block_inputs: Annotated[Inputs, Fields(*BLOCK, *COMMON)],
     shaking: options.Shaking,
-    request: Annotated[ParsedInputs, fields_of(*REQUEST, without=("component",))],
-    rate: Hazard,
+    request: Annotated[Inputs, Fields(*REQUEST, without=("component",))],
+    hazard: list[str] | None = option(
+        "Hazard curve as in rbfrag hazard, for the return period of failure; once for each "
+        "branch of a logic tree",
+        metavar="CURVE",
+    ),
+    weights: options.Weights = None,
+    years: float = option("Exposure time of the probability [years]", 50.0),
     meaning: options.Curve,
-    heading: Heading,
+    title: str | None = option("Title of the page [default: Seismic fragility of a rock block]"),
+    date: str = option("Date on the page [default: none]", ""),
     json: options.Json = False,
 ) -> None:
     """Write a report on blocks (PDF or HTML).
@@ -73,21 +48,21 @@ def report(
     file.
     """
     from rbfrag.exchange.block_table import read_rows
-    from rbfrag.plots.report.contents import COLUMNS, RateQuestion
-    from rbfrag.plots.report.write import TITLE, write_report
+    from rbfrag.plots.report import TITLE, write_report
+    from rbfrag.plots.report_contents import COLUMNS, RateQuestion
 
     inputs: dict[str, Any] = {**block_inputs, **shaking, **request}
-    if meaning.component is not None:
-        inputs["component"] = meaning.component
+    if meaning["component"] is not None:
+        inputs["component"] = meaning["component"]
     rows, remarks = [inputs], (*block_inputs.notes, *shaking.notes)
     if blocks:
         names = options.column_names(ignore_columns)
         rows, of_table = read_rows(blocks, inputs, sheet=sheet, ignore_columns=names)
         remarks += of_table
-    title = heading.title or (TITLE if len(rows) == 1 else "Seismic fragility of rock blocks")
-    question = RateQuestion(rate.hazard, rate.years, vars(meaning), rate.weights)
+    title = title or (TITLE if len(rows) == 1 else "Seismic fragility of rock blocks")
+    question = RateQuestion(hazard, years, meaning, weights)
     with block_inputs.named():
-        report = write_report(out, rows, question, title=title, date=heading.date, warnings=remarks)
+        report = write_report(out, rows, question, title=title, date=date, warnings=remarks)
     contents = [entry.contents for entry in report.entries if entry.contents is not None]
     if json:
         documents = [{"block_id": e.name, **e.contents.as_dict()} for e in report.entries

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
+from rbfrag.cli import options
+from rbfrag.cli.command import argument, option
+from rbfrag.cli.inputs import find_shaking
 from rbfrag.cli.output import (
     ProgressBar,
     check_files,
@@ -12,79 +15,50 @@ from rbfrag.cli.output import (
     say_when_compiling,
     write_table,
 )
-from rbfrag.cli.parameters import options
-from rbfrag.cli.parameters.motion import find_shaking
-from rbfrag.cli.parameters.option_groups import argument, option, stacked
 
 EXAMPLE = "Example:  rbfrag rockmass rockmass.toml --pgv 0.6 --out blocks.csv --plot counts.png"
 
 
-@dataclass(frozen=True, kw_only=True)
-class Drawn:
-    """Number of random blocks and seed."""
-
-    n: int | None = option("Number of realisations [default: from the file, else 20000]")
-    seed: int | None = option("Seed of the random numbers [default: from the file, else 1]")
-
-
-@dataclass(frozen=True, kw_only=True)
-class ShakenBy(options.Direction):
-    """Ground motion for the simulation of every block."""
-
-    motion: str | None = option(
-        "Accelerogram for the response of every block in its mode: a file, FILE#INDEX for "
-        "one trace of several, or a database id",
-        metavar="MOTION",
-    )
-    scales: str | None = option(
-        "Scale factors of the motion, such as 0.5,1,1.5,2 [default: 1]", metavar="LIST"
-    )
-    jobs: options.Jobs = None
-
-
-@dataclass(frozen=True, kw_only=True)
-class LimitOptions:
-    """Failure limits."""
-
-    displacement: float | None = option(
-        "Displacement limit of sliding [m] [default with --motion: 0.05]; with --pgv "
-        "required for modes other than toppling"
-    )
-    rotation: float | None = option(
-        "Rotation limit of slumping and confined toppling [deg] [default: failure past recovery]"
-    )
-
-
-@dataclass(frozen=True, kw_only=True)
-class RockMassFiles:
-    """Output files of the rock mass."""
-
-    out: str | None = option(
-        "Output table with one row per block, with a motion one per block and scale (.csv, "
-        ".xlsx, .parquet)"
-    )
-    excel_text: bool = option(options.EXCEL_TEXT, False)
-    plot: str | None = option(
-        "Figure of cumulative counts of blocks against PGA by mode, with a motion of the "
-        "fractions that fail (.png, .pdf, .svg)"
-    )
-
-
-@stacked
 def rockmass(
     *,
     file: str = argument(
         "Rock mass file (.toml or .csv): dips [deg], spacings [m], friction angles [deg]",
         metavar="FILE",
     ),
-    drawn: Drawn,
-    shaken: ShakenBy,
-    limits: LimitOptions,
+    n: int | None = option("Number of realisations [default: from the file, else 20000]"),
+    seed: int | None = option("Seed of the random numbers [default: from the file, else 1]"),
+    vertical: options.Vertical = None,
+    direction: options.Direction,
+    motion: str | None = option(
+        "Accelerogram for the response of every block in its mode: a file, FILE#INDEX for "
+        "one trace of several, or a database id",
+        metavar="MOTION",
+    ),
+    scales: str | None = option(
+        "Scale factors of the motion, such as 0.5,1,1.5,2 [default: 1]", metavar="LIST"
+    ),
+    jobs: options.Jobs = None,
+    displacement: float | None = option(
+        "Displacement limit of sliding [m] [default with --motion: 0.05]; with --pgv "
+        "required for modes other than toppling"
+    ),
+    rotation: float | None = option(
+        "Rotation limit of slumping and confined toppling [deg] [default: failure past recovery]"
+    ),
     measures: options.Measures,
     answering: options.Answering,
-    reading: options.ReadingOptions,
-    files: RockMassFiles,
-    printing: options.Printing,
+    reading: options.Reading,
+    out: str | None = option(
+        "Output table with one row per block, with a motion one per block and scale (.csv, "
+        ".xlsx, .parquet)"
+    ),
+    excel_text: options.ExcelText = False,
+    plot: str | None = option(
+        "Figure of cumulative counts of blocks against PGA by mode, with a motion of the "
+        "fractions that fail (.png, .pdf, .svg)"
+    ),
+    verbose: options.Verbose = False,
+    json: options.Json = False,
 ) -> None:
     """Sample blocks from two joint sets; print their modes and yields.
 
@@ -95,12 +69,12 @@ def rockmass(
     from rbfrag.campaign.rock_mass_answer import rockmass as answered
     from rbfrag.vocabulary.quantities import SPECTRAL
 
-    check_files(table=files.out, plot=files.plot, excel_text=files.excel_text)
+    check_files(table=out, plot=plot, excel_text=excel_text)
     ground = upward = None
     about: list[str] = []
-    if shaken.motion is not None:
+    if motion is not None:
         ground, upward, about = find_shaking(
-            shaken.motion, shaken, db=answering.get("db"), reading=reading
+            motion, vertical, db=answering.get("db"), reading=reading
         )
         say_when_compiling()
     intensities: dict[str, Any] = {**measures}
@@ -109,19 +83,19 @@ def rockmass(
     }
     with ProgressBar("rockmass", "blocks") as bar:
         answer = answered(
-            file, n=drawn.n, seed=drawn.seed, **intensities, sa_g=spectrum or None, motion=ground,
-            vertical=upward, polarity=shaken.polarity,
-            scales=options.number_list("1" if shaken.scales is None else shaken.scales, "--scales"),
-            displacement_m=limits.displacement, rotation_deg=limits.rotation, jobs=shaken.jobs,
+            file, n=n, seed=seed, **intensities, sa_g=spectrum or None, motion=ground,
+            vertical=upward, polarity=direction,
+            scales=options.number_list("1" if scales is None else scales, "--scales"),
+            displacement_m=displacement, rotation_deg=rotation, jobs=jobs,
             **answering,
             on_progress=lambda progress: bar.show(progress.completed, progress.total),
         )  # fmt: skip
     answer = replace(answer, warnings=(*answer.warnings, *about))
-    if files.out is not None:
+    if out is not None:
         table, notes = answer.table_columns(), answer.warnings
-        write_table(table, files.out, excel_text=files.excel_text, notes=notes)
-    if files.plot is not None:
+        write_table(table, out, excel_text=excel_text, notes=notes)
+    if plot is not None:
         from rbfrag.plots.plot import rockmass as draw
 
-        draw(answer, files.plot)
-    print_result(answer, json=printing.json, verbose=printing.verbose)
+        draw(answer, plot)
+    print_result(answer, json=json, verbose=verbose)

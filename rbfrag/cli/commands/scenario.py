@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Annotated
 
+from rbfrag.cli import options
+from rbfrag.cli.command import Fields, Inputs
 from rbfrag.cli.output import print_result
-from rbfrag.cli.parameters import options
-from rbfrag.cli.parameters.option_groups import ParsedInputs, fields_of, stacked
 from rbfrag.vocabulary.quantities import SOURCE
 
 EXAMPLE = "Example:  rbfrag scenario --magnitude 6.8 --rjb 12 --vs30 760 --mechanism reverse"
@@ -14,11 +14,10 @@ EXAMPLE = "Example:  rbfrag scenario --magnitude 6.8 --rjb 12 --vs30 760 --mecha
 _SITE = ("rjb_km", "vs30_m_s", "amplification", "amplification_sigma")
 
 
-@stacked
 def scenario(
     *,
-    inputs: Annotated[ParsedInputs, fields_of("magnitude", *_SITE)],
-    source: Annotated[ParsedInputs, fields_of(*SOURCE)],
+    inputs: Annotated[Inputs, Fields("magnitude", *_SITE)],
+    source: Annotated[Inputs, Fields(*SOURCE)],
     json: options.Json = False,
 ) -> None:
     """Print median and dispersion of the shaking in an earthquake.

@@ -5,31 +5,17 @@ from __future__ import annotations
 import importlib.util
 import json
 import os
-from dataclasses import asdict, dataclass
 from runpy import run_module
 
-from rbfrag.cli.parameters import options
-from rbfrag.cli.parameters.option_groups import option, stacked
+from rbfrag.cli import options
+from rbfrag.cli.command import option
 from rbfrag.errors import MissingExtraError
 
 EXAMPLE = "Example:  rbfrag serve --db rbfrag.db --port 8000"
 
 
-@dataclass(frozen=True, kw_only=True)
-class RequestLimits:
-    """Limits of a request."""
-
-    body_limit_mb: float = option("Maximum size of a request body [MB]", 16.0)
-    body_time: float = option("Maximum time to receive a request body [s]", 30.0)
-    row_limit: int = option("Maximum number of blocks or realisations per request", 100_000)
-    time_limit: float = option("Maximum time of an answer [s]", 60.0)
-    jobs: int = option("Number of processes for long computations per answering process", 2)
-
-
-@stacked
 def serve(
     *,
-    limits: RequestLimits,
     db: options.Db = None,
     host: str = option("Listening address; a token is required except for loopback", "127.0.0.1"),
     port: int = option("Listening port, 0 for any free port", 8000),
@@ -47,6 +33,11 @@ def serve(
         "Host name accepted in addition to localhost by a service without a token; repeatable",
         metavar="NAME",
     ),
+    body_limit_mb: float = option("Maximum size of a request body [MB]", 16.0),
+    body_time: float = option("Maximum time to receive a request body [s]", 30.0),
+    row_limit: int = option("Maximum number of blocks or realisations per request", 100_000),
+    time_limit: float = option("Maximum time of an answer [s]", 60.0),
+    jobs: int = option("Number of processes for long computations per answering process", 2),
 ) -> None:
     """Start the HTTP API and the web interface.
 
@@ -65,7 +56,11 @@ def serve(
             "token_file": token_file,
             "allow_origin": allow_origin or [],
             "allow_host": allow_host or [],
-            **asdict(limits),
+            "body_limit_mb": body_limit_mb,
+            "body_time": body_time,
+            "row_limit": row_limit,
+            "time_limit": time_limit,
+            "jobs": jobs,
         }
     )
     run_module("rbfrag.service", run_name="__main__")

@@ -2,33 +2,23 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
-
+from rbfrag.cli import options
+from rbfrag.cli.command import option
+from rbfrag.cli.inputs import find_motion
 from rbfrag.cli.output import check_files, print_json, print_result, write_table
-from rbfrag.cli.parameters import options
-from rbfrag.cli.parameters.motion import find_motion
-from rbfrag.cli.parameters.option_groups import option, stacked
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from numpy.typing import NDArray
-
-    from rbfrag.motions.toppling_spectrum import TopplingSpectrum
 
 EXAMPLE = "Example:  rbfrag spectrum record.AT2 --polarity both --plot spectrum.png"
 
 
-@stacked
 def spectrum(
     *,
     motions: options.Motions,
-    reading: options.ReadingOptions,
+    reading: options.Reading,
     p2: str = option("Frequency parameters p² [1/s²], separated by commas", "30,10,3,1,0.3,0.1"),
     kr: float | None = option("Block to compare: uplift acceleration coefficient k_r, with one p²"),
     polarity: options.Polarity = "forward",
     csv: str | None = option("Output table of the spectra (.csv, .xlsx, .parquet)"),
-    excel_text: bool = option(options.EXCEL_TEXT, False),
+    excel_text: options.ExcelText = False,
     plot: str | None = option("Figure of the spectra over p² with PGV (.png, .pdf, .svg)"),
     db: options.Db = None,
     json: options.Json = False,
@@ -49,7 +39,11 @@ def spectrum(
         for way in polarities
     ]
     if csv is not None:
-        write_table(_columns(spectra), csv, excel_text=excel_text)
+        import numpy as np
+
+        tables = [result.table_columns() for result in spectra]
+        columns = {name: np.concatenate([table[name] for table in tables]) for name in tables[0]}
+        write_table(columns, csv, excel_text=excel_text)
     if plot is not None:
         from rbfrag.plots.spectrum import plot_spectrum
 
@@ -62,11 +56,3 @@ def spectrum(
         if i:
             print()
         print_result(result, json=False)
-
-
-def _columns(spectra: Sequence[TopplingSpectrum]) -> dict[str, NDArray[Any]]:
-    """Return the columns of all spectra, one row per p²."""
-    import numpy as np
-
-    tables = [spectrum.table_columns() for spectrum in spectra]
-    return {name: np.concatenate([table[name] for table in tables]) for name in tables[0]}

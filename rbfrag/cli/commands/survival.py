@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Annotated
 
+from rbfrag.cli import options
+from rbfrag.cli.command import Fields, Inputs, argument, option
+from rbfrag.cli.inputs import BlockTable
 from rbfrag.cli.output import OPTION_FIELDS, check_files, print_result
-from rbfrag.cli.parameters import options
-from rbfrag.cli.parameters.block import TableOptions
-from rbfrag.cli.parameters.option_groups import ParsedInputs, argument, fields_of, option, stacked
 from rbfrag.vocabulary.quantities import BLOCK, COMMON
 
 EXAMPLE = (
@@ -17,17 +17,6 @@ EXAMPLE = (
 )
 
 
-@dataclass(frozen=True, kw_only=True)
-class Uncertainty:
-    """Uncertainty of the age of the blocks."""
-
-    age: float = option("Mean age of the blocks in their present position [years]", default=...)
-    age_sd: float = option("Standard deviation of the lognormal age [years]", 0.0)
-    draws: int = option("Number of draws for several uncertain blocks", 128)
-    seed: int = option("Seed of the draws", 0)
-
-
-@stacked
 def survival(
     *,
     curves: list[str] = argument(
@@ -35,26 +24,27 @@ def survival(
         "branches), USGS NSHM JSON, or CSV of two columns with units in the header",
         metavar="CURVE...",
     ),
-    inputs: Annotated[ParsedInputs, fields_of(*BLOCK, *COMMON, without=("kind",))],
+    inputs: Annotated[Inputs, Fields(*BLOCK, *COMMON, without=("kind",))],
     kind: str | None = option(
         "Kind of failure: rocking (free-standing), toppling (backed by a rock face), slumping, "
         "confined_toppling or sliding; required except for tables with a column kind, and with "
         "the parameters of other kinds (--restitution, --ky, --ks, --kct)",
         rich_help_panel="Block and shaking",
     ),
-    blocks: TableOptions,
-    uncertainty: Uncertainty,
+    blocks: BlockTable,
+    age: float = option("Mean age of the blocks in their present position [years]", ...),
+    age_sd: float = option("Standard deviation of the lognormal age [years]", 0.0),
+    draws: int = option("Number of draws for several uncertain blocks", 128),
+    seed: int = option("Seed of the draws", 0),
     meaning: options.Curve,
     answering: options.Answering,
-    weights: str | None = option(
-        "Weights of the logic-tree branches in the order of the curves, such as 0.5,0.3,0.2, "
-        "or the realizations file of OpenQuake"
-    ),
+    weights: options.Weights = None,
     plot: str | None = option(
         "Figure of the curves, survival probability over the factor on their rates, and "
         "weights (.png, .pdf, .svg)"
     ),
-    printing: options.Printing,
+    verbose: options.Verbose = False,
+    json: options.Json = False,
 ) -> None:
     """Print the survival probability of standing blocks.
 
@@ -75,17 +65,17 @@ def survival(
         inputs["kind"] = kind
     if blocks.blocks is None:
         require_kind(inputs)
-    several = blocks.collect_blocks(inputs, reads=("count",), need_kind=KIND_MISSING)
+    several = blocks.collect(inputs, reads=("count",), need_kind=KIND_MISSING)
     remarks, rows, numbers = several.remarks, several.rows, several.numbers
     if rows is not None:
         rows.require_all(ALL_STAND)
         remarks += rows.remarks
         count = rows.blocks.get("count", np.ones(len(numbers["kind"]))).astype(np.intp)
         numbers = {name: np.repeat(values, count).tolist() for name, values in numbers.items()}
-    read = as_curves(curves, **vars(meaning))
+    read = as_curves(curves, **meaning)
     answer = answered(
-        read, age_years=uncertainty.age, age_sd_years=uncertainty.age_sd, weights=weights,
-        draws=uncertainty.draws, seed=uncertainty.seed, **numbers, **vars(meaning), **answering,
+        read, age_years=age, age_sd_years=age_sd, weights=weights,
+        draws=draws, seed=seed, **numbers, **meaning, **answering,
     )  # fmt: skip
     answer = replace(answer, warnings=(*remarks, *answer.warnings))
     if rows is None:
@@ -94,8 +84,8 @@ def survival(
         text = describe.block(str(answer.method), {**inputs, **values}, support=False)
         answer = replace(answer, block_text=text)
     if plot is not None:
-        from rbfrag.plots.survival import plot_survival
+        from rbfrag.plots.hazard import plot_survival
 
         plot_survival(read, answer, plot)
     fields = OPTION_FIELDS if rows is None else ()  # notes on a table name its columns
-    print_result(answer, json=printing.json, verbose=printing.verbose, fields=fields)
+    print_result(answer, json=json, verbose=verbose, fields=fields)

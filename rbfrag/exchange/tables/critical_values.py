@@ -19,7 +19,7 @@ from rbfrag.db.campaigns import CombinationRecord, insert_combinations
 from rbfrag.db.engine import opened_database
 from rbfrag.db.insert import insert_row
 from rbfrag.db.keys import canonical_json, combination_key
-from rbfrag.db.merge.databases import MergeReport, merge_databases
+from rbfrag.db.merge import MergeReport, merge_databases
 from rbfrag.db.motions import recording_id_for
 from rbfrag.db.rows import IMPORTED, EarthquakeInfo
 from rbfrag.db.schema import MEASURES, campaign, motion

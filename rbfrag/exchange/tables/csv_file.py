@@ -1,10 +1,14 @@
-"""Tables of blocks as CSV: with commas, or with semicolons and decimal commas."""
+"""Tables of blocks as CSV: with commas, or with semicolons and decimal commas.
+
+Excel, and others like it, compute a cell that begins with = + - or @, whatever program wrote the
+file; a leading apostrophe tells them that it is text. Readers here take such an apostrophe off.
+"""
 
 from __future__ import annotations
 
 import csv
 import re
-from collections.abc import Container, Generator, Mapping, Sequence
+from collections.abc import Callable, Container, Generator, Mapping, Sequence
 from contextlib import ExitStack
 from itertools import islice
 from pathlib import Path
@@ -31,6 +35,73 @@ from rbfrag.exchange.tables.parts import (
 )
 from rbfrag.files import encoding_of
 from rbfrag.question.table import ROWS_ABOVE, fields_stated, header_row
+from rbfrag.results.diagnostic import Diagnostic
+
+_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?|[+-](inf|nan)", re.ASCII)
+_SUSPECT = r"^'?[=+\-@]"
+
+
+def is_formula(text: str) -> bool:
+    """Return whether a spreadsheet would evaluate a cell; a number is not a formula."""
+    return text[:1] in ("=", "+", "-", "@") and not _NUMBER.fullmatch(text)
+
+
+def as_text(text: str) -> str:
+    """Return a cell in the form that spreadsheets accept as text."""
+    return f"'{text}" if is_formula(text) else text
+
+
+def as_written(text: str) -> str:
+    """Return the original cell: the inverse of :func:`as_text`."""
+    return text[1:] if text[:1] == "'" and is_formula(text[1:]) else text
+
+
+def changed_texts(columns: Mapping[str, Any], change: Callable[[str], str]) -> dict[str, Any]:
+    """Return columns with their texts converted; columns without a suspect cell are unchanged.
+
+    Args:
+        columns: by name; lists, arrays of numpy or of Arrow. Numbers are left alone.
+        change: :func:`as_text` or :func:`as_written`.
+    """
+    return {
+        name: [change(cell) if isinstance(cell, str) else cell for cell in cells_of(column)]
+        if _suspect(column)
+        else column
+        for name, column in columns.items()
+    }
+
+
+def formula_warnings(columns: Mapping[str, Any]) -> list[Diagnostic]:
+    """Return a warning that names the first cell that spreadsheets evaluate, or an empty list."""
+    for name, column in columns.items():
+        for cell in _texts(column) if _suspect(column) else ():
+            if is_formula(cell):
+                text = (
+                    f"the cell {cell[:40]!r} of the column {name} begins with {cell[0]}, which "
+                    "Excel takes for a formula; excel_text writes it as text"
+                )
+                return [Diagnostic(text, "spreadsheet_formula", fields=("excel_text",))]
+    return []
+
+
+def _suspect(column: Any) -> bool:
+    """Return whether a column has texts that may be, or may have been, formulas."""
+    if isinstance(column, np.ndarray) and column.dtype.kind not in "OU":
+        return False
+    if isinstance(column, list | np.ndarray):
+        return any(re.match(_SUSPECT, cell) for cell in _texts(column))
+    import pyarrow
+    import pyarrow.compute
+
+    if not pyarrow.types.is_string(column.type):
+        return False
+    suspects = pyarrow.compute.match_substring_regex(column, _SUSPECT)
+    return bool(pyarrow.compute.any(suspects).as_py())
+
+
+def _texts(column: Any) -> list[str]:
+    return [cell for cell in cells_of(column) if isinstance(cell, str)]
+
 
 NOTE = "# note"
 """First cell of a line below a table that holds a warning about it."""
@@ -103,6 +174,7 @@ def _by_arrow(
     """Yield parts as far as pyarrow can read them; return the number of rows read, None for all."""
     try:
         arrow, _ = pyarrow()
+        from pyarrow import compute
         from pyarrow import csv as arrow_csv
     except MissingExtraError:
         return 0
@@ -121,7 +193,11 @@ def _by_arrow(
             ),
         )
         for batch in batches:
-            if not _rows_are_lines(batch, arrow):
+            # each row must be one line of the file, and none of them blank
+            texts = [column for column in batch.columns if arrow.types.is_string(column.type)]
+            if blank_rows(arrow, batch).any() or any(
+                compute.any(compute.match_substring(column, "\n")).as_py() for column in texts
+            ):
                 return rows_read
             cells: dict[str, Any] = {
                 name: np.array(column.to_numpy(zero_copy_only=False)) if name in numeric else column
@@ -134,16 +210,6 @@ def _by_arrow(
     except arrow.ArrowException:
         return rows_read
     return None
-
-
-def _rows_are_lines(batch: Any, arrow: Any) -> bool:
-    """Return whether each row is one line of the file, and none of them is blank."""
-    from pyarrow import compute
-
-    texts = [column for column in batch.columns if arrow.types.is_string(column.type)]
-    if any(compute.any(compute.match_substring(column, "\n")).as_py() for column in texts):
-        return False
-    return not blank_rows(arrow, batch).any()
 
 
 def csv_writer(

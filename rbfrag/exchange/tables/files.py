@@ -14,10 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbfrag.errors import InputError
-from rbfrag.exchange.excel_text import as_text, changed_texts
-from rbfrag.exchange.points import SUFFIXES as GEOJSON
-from rbfrag.exchange.points import read_points
-from rbfrag.exchange.tables.csv_file import csv_writer, open_csv
+from rbfrag.exchange.map_files import SUFFIXES as GEOJSON
+from rbfrag.exchange.map_files import read_points
+from rbfrag.exchange.tables.csv_file import as_text, changed_texts, csv_writer, open_csv
 from rbfrag.exchange.tables.parquet import open_parquet, parquet_writer
 from rbfrag.exchange.tables.parts import Dialect, TableFile, TablePart, Write, pyarrow
 from rbfrag.exchange.tables.workbook import open_workbook, openpyxl, workbook_writer

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbfrag.errors import MissingExtraError
+from rbfrag.files import is_numeral
 from rbfrag.question.table import ROWS_ABOVE, header_row, number_with_unit
 from rbfrag.results.diagnostic import Diagnostic
 
@@ -81,7 +82,7 @@ class TablePart:
                 values[i] = _number(cell, self.decimal) * factor
             except (ValueError, OverflowError) as error:
                 # "7°" and "30 cm" carry a unit, which goes before that of the header
-                bare = not isinstance(cell, str) or _is_number(cell.strip().replace(",", "."))
+                bare = not isinstance(cell, str) or is_numeral(cell.strip().replace(",", "."))
                 number = None if bare else number_with_unit(cell, unit)
                 if number is None:
                     faults[i] = f"{column} {error}"
@@ -215,24 +216,16 @@ def _number(cell: object, decimal: str) -> float:
     if not text:
         return np.nan
     shown, pointed = f"= {text[:40]!r}", text.replace(",", ".")
-    is_number = _is_number(text)
+    is_number = is_numeral(text)
     if is_number and ("." in decimal or "." not in text):
         return float(text)
     if is_number:
         raise ValueError(f"{shown} has a decimal point, and the table has decimal commas")
-    if "." in text or not _is_number(pointed):
+    if "." in text or not is_numeral(pointed):
         raise ValueError(f"{shown} is not a number")
     if decimal != "," and re.fullmatch(r"[+-]?[1-9]\d{0,2},\d{3}", text):
         raise ValueError(f"{shown} is {pointed} or {text.replace(',', '')}: write it as a number")
     return float(pointed)
-
-
-def _is_number(text: str) -> bool:
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True
 
 
 def pyarrow() -> tuple[Any, Any]:

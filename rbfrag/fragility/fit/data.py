@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, fields, replace
 from typing import TYPE_CHECKING, Any, Unpack
 
@@ -18,9 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rbfrag.db.rows import IMPORTED, CombinationTable, Selection
 from rbfrag.errors import FitError
-from rbfrag.fragility.domain import INSIDE
-from rbfrag.fragility.fit.domain import ranges_of, ratio_columns
-from rbfrag.fragility.fit.scores import ScoredBlocks, critical_outcomes
+from rbfrag.fragility.domain import INSIDE, ratios_of
 from rbfrag.fragility.measures import Term
 from rbfrag.fragility.method import TOPPLING_BLOCK, BlockParameters, Method, arrays
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
@@ -34,7 +32,6 @@ if TYPE_CHECKING:
 
 FEWEST_EVENTS = 3
 FEWEST_OBSERVED = 10
-FEW_EVENTS = 10
 
 KR = (0.02, 1.0)
 """k_r, or k_y, of the weakest and the strongest block that fits read: no rock stands at 1°."""
@@ -59,6 +56,38 @@ _CENSORED = ("below_limit", "no_motion")
 
 
 @dataclass(frozen=True, eq=False)
+class ScoredBlocks:
+    """The blocks on which a fit is scored.
+
+    Args:
+        failed: 0 or 1, shape (n, m).
+        is_known: where the outcome is known.
+        event: number of each row's earthquake, shape (n,).
+        source: where the outcomes come from.
+    """
+
+    failed: FloatArray
+    is_known: NDArray[np.bool_]
+    event: NDArray[np.intp]
+    source: str
+
+
+def critical_outcomes(
+    critical: FloatArray, observed: NDArray[np.bool_], strength: FloatArray
+) -> tuple[FloatArray, NDArray[np.bool_]]:
+    """Return the outcomes that follow from critical values, 0 or 1, and where they are known.
+
+    Args:
+        critical: critical strength, for censored points the value it lies below, shape (n,).
+        observed: False for censored points, shape (n,).
+        strength: of the blocks, shape (n, m).
+    """
+    reached = critical[:, None] >= strength
+    is_known = (observed[:, None] | ~reached) & (strength > 0.0)
+    return (reached & observed[:, None]).astype(np.float64), is_known
+
+
+@dataclass(frozen=True, eq=False)
 class FitSource:
     """Combinations of block and motion with all data for fitting, columns of equal length.
 
@@ -72,7 +101,7 @@ class FitSource:
             where that is not known.
         sensitive: whether outcomes of the grid are other ones for the motion times 1 ± 1e-6, shape
             (n, m), NaN where that is not stored; None where it is of none.
-        of_block: what is stored of the blocks beside their size, by name, shape (n,).
+        of_block: what is stored of the blocks in addition to their size, by name, shape (n,).
         structures: number of motions that are excluded, recorded on structures.
         narrow: greatest (upper - lower)/lower of a critical value that counts as found.
     """
@@ -152,7 +181,7 @@ def read_source(
         kind: response kind; None for the one that `block` stands for.
     """
     from rbfrag.db import queries
-    from rbfrag.db.spectra import spectrum_values
+    from rbfrag.db.campaigns import spectrum_values
 
     kind_read = kind or block.kind
     table = queries.combination_table(connection, kind=kind_read, **selection)
@@ -171,10 +200,7 @@ def read_source(
         grid.displacement_m,
         np.array([recordings[motion] for motion in table.motion_id.tolist()], dtype=np.int64),
         grid.sensitive if np.isfinite(grid.sensitive).any() else None,
-        {
-            name: np.array([_number_of(text, name) for text in table.block], dtype=np.float64)
-            for name in block.stored
-        },
+        {name: _numbers_of(table.block, name) for name in block.stored},
         0 if all_sensors else queries.motions_on_structures(connection, kind_read),
     )
     if grid.outcome.shape[1] == 0 and block.points == "strengths":
@@ -183,12 +209,13 @@ def read_source(
     return source
 
 
-def _number_of(block: str | None, name: str) -> float:
-    """Return a stored number of a block."""
-    value = json.loads(block or "{}").get(name)
-    if not isinstance(value, int | float):
-        raise FitError(f"a stored block {block} has no {name}: run  rbfrag db check")
-    return float(value)
+def _numbers_of(blocks: Iterable[str | None], name: str) -> FloatArray:
+    """Return a number that each stored block has in addition to its size."""
+    values = [json.loads(block or "{}").get(name) for block in blocks]
+    for block, value in zip(blocks, values, strict=True):
+        if not isinstance(value, int | float):
+            raise FitError(f"a stored block {block} has no {name}: run  rbfrag db check")
+    return np.array(values, dtype=np.float64)
 
 
 @dataclass(frozen=True, eq=False)
@@ -437,6 +464,18 @@ def _reject_thin(data: FitData, method: Method, term: Term) -> None:
             f"all motions have the same {term.title}, {data.x[tells][0]:.4g} m/s: a line "
             "needs motions of different strength"
         )
+
+
+def ranges_of(values: Mapping[str, FloatArray]) -> dict[str, tuple[float, float]]:
+    """Return the range of the finite values of each variable."""
+    finite = {name: v[np.isfinite(v)] for name, v in values.items()}
+    return {name: (float(v.min()), float(v.max())) for name, v in finite.items() if v.size}
+
+
+def ratio_columns(measures: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
+    """Return every ratio that the intensity measures allow; not finite without shaking."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return {ratio.name: np.asarray(ratio.formula(measures)) for ratio in ratios_of(measures)}
 
 
 def _measures(source: FitSource) -> dict[str, FloatArray]:

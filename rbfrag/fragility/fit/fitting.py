@@ -2,32 +2,43 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
-from dataclasses import asdict, dataclass
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass
 from datetime import UTC, datetime
 from os import PathLike
 from typing import TYPE_CHECKING, Required, Unpack
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rbfrag.db.model_file import ModelRow, reject_taken
 from rbfrag.db.rows import IMPORTED, CombinationTable, Selection
 from rbfrag.errors import FitError, InputError
-from rbfrag.fragility.fit.clusters import cr3
+from rbfrag.fragility.domain import INSIDE
 from rbfrag.fragility.fit.data import NARROW, FitData, FitSource, fit_data, read_source
 from rbfrag.fragility.fit.dependence import estimate_dependence, observed_blocks
-from rbfrag.fragility.fit.domain import joint_scatter
+from rbfrag.fragility.fit.line import fit_wls
+from rbfrag.fragility.fit.maximum_likelihood import fit_censored, fit_lognormal, fit_outcomes
 from rbfrag.fragility.fit.report import FitReport, log_correlations, power_law
-from rbfrag.fragility.fit.result import MethodResult
+from rbfrag.fragility.fit.result import FEW_EVENTS, MethodResult, cr3
 from rbfrag.fragility.measures import Term, intensity_term
 from rbfrag.fragility.method import Method
 from rbfrag.fragility.methods import method_named, methods
-from rbfrag.fragility.model import FragilityModel
-from rbfrag.motions.pulses import PULSE
-from rbfrag.solver.results import NUMERICS_VERSION
+from rbfrag.fragility.model import IS_ESTIMATED, FragilityModel
+from rbfrag.motions.sample_motions import PULSE
+from rbfrag.solver.results import NUMERICS_VERSION, FloatArray
+from rbfrag.threads import with_one_thread
 
 if TYPE_CHECKING:
     from sqlalchemy import Connection
+
+
+ESTIMATORS: Mapping[str, Callable[..., MethodResult]] = {
+    "outcomes": fit_outcomes,
+    "line": fit_wls,
+    "log_line": fit_lognormal,
+    "censored": fit_censored,
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,6 +62,8 @@ class FitOptions(Selection, total=False):
     method: str | None
     name: str | None
     seed: int
+    bootstrap: bool
+    dependence: bool
     estimate_m: bool
 
 
@@ -62,6 +75,8 @@ def fit(
     method: str | None = None,
     name: str | None = None,
     seed: int = 0,
+    bootstrap: bool = False,
+    dependence: bool = False,
     estimate_m: bool = False,
     taken: Collection[str] = (),
     **selection: Unpack[Selection],
@@ -99,11 +114,19 @@ def fit(
             source = read_source(connection, chosen.block, kind=kind, **selection)
     elif not isinstance(source, FitSource):
         source = read_source(source, chosen.block, kind=kind, **selection)
+    condition = selection.get("where")
+    if condition is not None and source.table.p2.size == 0:
+        raise FitError(f"no stored result meets where = {condition!r}: change the condition")
     if method is None and not np.isfinite(source.failed).any():
         chosen = method_of_kind(kind, None, term, estimate_m=estimate_m, reads="critical")
+    why = None
+    if method is None:
+        suited = [candidate.name for candidate in methods_of_kind(kind) if term in candidate.forms]
+        of = "no outcomes are stored; of critical values" if chosen.reads == "critical" else "of"
+        why = f"{chosen.name}, {of} {', '.join(suited)} the best on earthquakes left out"
     return fit_source(
-        source, of_term, chosen, kind=kind, name=name, seed=seed, estimate_m=estimate_m,
-        selection=selection, why=None if method else _why(chosen, of_term, kind),
+        source, of_term, chosen, kind=kind, name=name, seed=seed, bootstrap=bootstrap,
+        dependence=dependence, estimate_m=estimate_m, selection=selection, why=why,
     ).report  # fmt: skip
 
 
@@ -153,13 +176,7 @@ def method_of_kind(
     return chosen
 
 
-def _why(chosen: Method, term: Term, kind: str) -> str:
-    """Return the reason for the default method."""
-    suited = [method.name for method in methods_of_kind(kind) if term.name in method.forms]
-    of = "no outcomes are stored; of critical values" if chosen.reads == "critical" else "of"
-    return f"{chosen.name}, {of} {', '.join(suited)} the best on earthquakes left out"
-
-
+@with_one_thread
 def fit_source(
     source: FitSource,
     term: Term,
@@ -168,31 +185,46 @@ def fit_source(
     kind: str | None = None,
     name: str | None = None,
     seed: int = 0,
+    bootstrap: bool = False,
+    dependence: bool = False,
     estimate_m: bool = False,
     selection: Selection | None = None,
-    shared: bool = True,
     why: str | None = None,
 ) -> Fitted:
     """Fit a model and keep its held-out probabilities.
 
-    Arguments as for :func:`fit`; `shared` says whether what blocks of one earthquake share is
-    estimated too, which a study of scores has no use for; `why` why this method is taken.
+    Arguments as for :func:`fit`; `why` is why this method is taken.
     """
     # Rows -> coefficients -> what blocks of one earthquake share -> the stored row: each step sees
     # only the output of the one before.
     table, chosen = source.table, selection or {}
     data = fit_data(source, method, term, kind=kind)
     options = {"estimate_m": True} if estimate_m else {}
-    result: MethodResult = method.fit(data, method, term, seed=seed, **options)
-    dependence, unknown = _dependence(data, method, result, seed) if shared else (None, [])
+    # Errors clustered by earthquake are known to fail with few earthquakes: those
+    # with a critical value, or else with outcomes
+    has_value = data.observed
+    if method.reads == "outcomes" and not has_value.any():
+        has_value = np.ones_like(data.observed)
+    events = int(np.unique(data.event[has_value]).size)
+    options["resample"] = bootstrap or events < FEW_EVENTS
+    result = ESTIMATORS[method.fit](data, method, term, seed=seed, **options)
+    shared, unknown = None, []
+    if dependence:
+        try:
+            blocks = observed_blocks(data, method.block, result.held_out)
+            shared = estimate_dependence(seed=seed, **blocks)
+        except FitError as error:
+            unknown = [f"the range of one future earthquake is not known: {error}"]
     # The critical values also give the power law of the dissertation and the ranking of terms by
     # their correlation with ln y*.
     of_any_strength = method.block.points == "strengths"
-    law = power_law(table) if of_any_strength else None
     correlations = log_correlations(table) if of_any_strength else {}
-    of_outcomes = method.reads == "outcomes"
-    of_data = _data_warnings(data, source.structures)
-    warnings = [*_older(table), *of_data, *result.warnings, *unknown]
+    # without those that mechanics rules out
+    fitted = data.read.copy()
+    with np.errstate(invalid="ignore", divide="ignore"):
+        for bound in method.forms[term.name].bounds:
+            fitted &= ~bound.holds(data.blocks)
+    warnings = [*_data_warnings(data, source), *result.warnings, *unknown]
     row = ModelRow(
         name=name or _name(method, term, data.kind, chosen),
         kind=data.kind,
@@ -201,7 +233,7 @@ def fit_source(
         coefficients=result.coefficients,
         covariance=tuple(tuple(line) for line in cr3(result.steps).tolist()),
         leave_out_steps=tuple(tuple(line) for line in result.steps.tolist()),
-        dependence=dependence,
+        dependence=shared,
         domain=data.domain,
         data_fingerprint=data.fingerprint,
         diagnostics={
@@ -209,7 +241,7 @@ def fit_source(
             "n": int(data.observed.sum()),
             "n_censored": int(data.censored.sum()),
             "narrow": NARROW,
-            "events": _events(data, of_outcomes),
+            "events": events,
             "scores": result.scores,
             "warnings": warnings,
             "n_total": data.n_total,
@@ -220,16 +252,19 @@ def fit_source(
             "n_outside_model": data.n_outside_model,
             "guessed_events": data.guessed_events,
             "recorded_events": sum(not name.startswith(PULSE) for name in data.event_names),
-            "power_law": asdict(law) if law is not None else None,
+            "power_law": power_law(table) if of_any_strength else None,
             "log_correlations": correlations,
             "term_rank": list(correlations),
             "suite": chosen.get("suite"),
+            "where": chosen.get("where"),
             "doubtful_pgd": chosen.get("doubtful_pgd", False),
             "include_structures": chosen.get("include_structures", False),
             "vertical": chosen.get("vertical", "without"),
             "rotation_deg": chosen.get("rotation_deg"),
+            "seed": seed,
+            IS_ESTIMATED: dependence,
             **({"why_method": why} if why else {}),
-            "mahalanobis": _scatter(data, method, term),
+            "mahalanobis": joint_scatter((*method.block.names, *term.inputs), data.blocks, fitted),
             **result.details,
         },
         created=datetime.now(UTC).isoformat(timespec="seconds"),
@@ -237,13 +272,35 @@ def fit_source(
     return Fitted(FitReport.from_model(FragilityModel.from_row(row)), data, result)
 
 
-def _scatter(data: FitData, method: Method, term: Term) -> dict[str, object] | None:
-    """Return the scatter of the fitted points, without those that mechanics rules out."""
-    fitted = data.read.copy()
-    with np.errstate(invalid="ignore", divide="ignore"):
-        for bound in method.forms[term.name].bounds:
-            fitted &= ~bound.holds(data.blocks)
-    return joint_scatter((*method.block.names, *term.inputs), data.blocks, fitted)
+def joint_scatter(
+    names: Sequence[str], values: Mapping[str, FloatArray], fitted: NDArray[np.bool_]
+) -> dict[str, object] | None:
+    """Return the scatter of the fitted points in the logarithms of the predictors.
+
+    Args:
+        values: by name, of a shape that broadcasts to that of `fitted`.
+        fitted: which points are fitted, shape (n, m).
+
+    Returns:
+        names, centre, inverse covariance and the radius that the share `INSIDE` of the points lies
+        within, JSON-able; None where there are no points. A direction in which the points do not
+        scatter counts nothing: the ranges of single variables hold there.
+    """
+    with np.errstate(divide="ignore", invalid="ignore"):
+        logs = np.stack([np.log(np.broadcast_to(values[n], fitted.shape)) for n in names], axis=-1)
+    points = logs[fitted & np.isfinite(logs).all(axis=-1)]
+    if len(points) <= len(names):
+        return None
+    centre = points.mean(axis=0)
+    inverse = np.linalg.pinv(np.atleast_2d(np.cov(points.T)), rcond=1e-10, hermitian=True)
+    from_centre = points - centre
+    distance = np.sqrt(np.einsum("ij,jk,ik->i", from_centre, inverse, from_centre, optimize=True))
+    return {
+        "names": list(names),
+        "centre": centre.tolist(),
+        "inverse_covariance": inverse.tolist(),
+        "radius": float(np.quantile(distance, INSIDE, method="higher")) * (1.0 + 1e-9),
+    }
 
 
 def _reject_unfit(
@@ -279,50 +336,22 @@ def _name(method: Method, term: Term, kind: str, selection: Mapping[str, object]
     return "-".join([*parts, *([method.name] if several else []), term.name])
 
 
-def _events(data: FitData, of_outcomes: bool) -> int:
-    """Return the number of earthquakes with a critical value, or else with outcomes."""
-    informative = (
-        data.observed if data.observed.any() or not of_outcomes else np.ones_like(data.observed)
-    )
-    return int(np.unique(data.event[informative]).size)
-
-
-def _dependence(
-    data: FitData, method: Method, result: MethodResult, seed: int
-) -> tuple[dict[str, object] | None, list[str]]:
-    """Return the dependence model of blocks in one earthquake, or why it is unknown."""
-    try:
-        blocks = observed_blocks(data, method.block, result.held_out)
-        estimate = estimate_dependence(seed=seed, **blocks)
-    except FitError as error:
-        return None, [f"the range of one future earthquake is not known: {error}"]
-    return {
-        **asdict(estimate.dependence),
-        "errors": estimate.errors,
-        "earthquakes": estimate.earthquakes,
-        "pairs": list(estimate.pairs),
-        "replicates": estimate.replicates,
-        "seed": estimate.seed,
-    }, []
-
-
-def _older(table: CombinationTable) -> list[str]:
-    """Return the warning about results of earlier numerics versions."""
-    if IMPORTED in table.numerics_version:
-        return ["the critical values are imported: safe islands below them are not seen"]
-    return [
-        f"the results are of version {version} of the numerics, and this rbfrag computes by "
-        f"version {NUMERICS_VERSION}: simulate again to have its own"
-        for version in dict.fromkeys(table.numerics_version.tolist())
-        if version != NUMERICS_VERSION
-    ]
-
-
-def _data_warnings(data: FitData, structures: int) -> list[str]:
-    result = []
-    if structures:
+def _data_warnings(data: FitData, source: FitSource) -> list[str]:
+    """Return the warnings about results of earlier numerics versions and about excluded data."""
+    versions, result = source.table.numerics_version, []
+    if IMPORTED in versions:
+        result.append("the critical values are imported: safe islands below them are not seen")
+    else:
+        result += [
+            f"the results are of version {version} of the numerics, and this rbfrag computes by "
+            f"version {NUMERICS_VERSION}: simulate again to have its own"
+            for version in dict.fromkeys(versions.tolist())
+            if version != NUMERICS_VERSION
+        ]
+    if source.structures:
         result.append(
-            f"{structures} motions recorded on structures are excluded: they are not ground motion"
+            f"{source.structures} motions recorded on structures are excluded: they are not ground "
+            "motion"
         )
     if data.guessed_events:
         result.append(

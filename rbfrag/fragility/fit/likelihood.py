@@ -10,8 +10,8 @@ from __future__ import annotations
 import math
 import warnings
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any, Protocol, Self
+from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,27 +26,6 @@ TOLERANCE = 1e-10
 MOST_ITERATIONS = 200
 _EDGE = 1e-12
 _HALF_LN_2PI = 0.5 * math.log(2.0 * math.pi)
-
-
-class Likelihood(Protocol):
-    """A likelihood as a function of parameters, shape (k,), over rows of earthquakes."""
-
-    @property
-    def event(self) -> NDArray[np.intp]:
-        """Earthquake index of each row, shape (n,)."""
-
-    def only(self, chosen: Chosen) -> Self:
-        """Return a subset of the rows."""
-
-    def log_likelihood(self, b: FloatArray) -> FloatArray:
-        """Return the log likelihood of each row, shape (n,)."""
-
-    def derivatives(
-        self, b: FloatArray, times: FloatArray | None = None
-    ) -> tuple[FloatArray, FloatArray]:
-        """Return the score, shape (k,), and the information, shape (k, k), with rows weighted by
-        `times`.
-        """
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,6 +44,8 @@ class Binomial:
     outcome: FloatArray
     weights: FloatArray
     event: NDArray[np.intp]
+    last: list[FloatArray] = field(default_factory=list, init=False, repr=False)
+    """Parameters of the last call, linear predictor and P: the derivatives follow a loss."""
 
     def only(self, chosen: Chosen) -> Binomial:
         """Return a subset of the rows."""
@@ -73,13 +54,17 @@ class Binomial:
         )
         return Binomial(self.link, columns, outcome, weights, self.event[chosen])
 
-    def eta(self, b: FloatArray) -> FloatArray:
-        """Return the linear predictor of each row, limited to the finite range of exponentials."""
-        return np.clip(self.columns @ b, -700.0, 700.0)
+    def _eta_and_p(self, b: FloatArray) -> list[FloatArray]:
+        # eta is limited to the finite range of exponentials; arrays of parameters do not change
+        if not self.last or self.last[0] is not b:
+            eta = np.clip(self.columns @ b, -700.0, 700.0)
+            p = np.asarray(self.link.probability(eta, arrays()), dtype=np.float64)
+            self.last[:] = b, eta, p
+        return self.last[1:]
 
     def probability(self, b: FloatArray) -> FloatArray:
         """Return P of each row."""
-        return np.asarray(self.link.probability(self.eta(b), arrays()), dtype=np.float64)
+        return self._eta_and_p(b)[1]
 
     def log_likelihood(self, b: FloatArray) -> FloatArray:
         """Return the weighted log likelihood of each row."""
@@ -89,10 +74,13 @@ class Binomial:
     def derivatives(
         self, b: FloatArray, times: FloatArray | None = None
     ) -> tuple[FloatArray, FloatArray]:
-        """Return score and expected information."""
+        """Return the score, shape (k,), and the expected information, shape (k, k), with rows
+        weighted by `times`.
+        """
         x, w = self.columns, self.weights if times is None else self.weights * times
-        p = np.clip(self.probability(b), _EDGE, 1.0 - _EDGE)
-        slope = self.link.density(self.eta(b), arrays())
+        eta, p = self._eta_and_p(b)
+        p = np.clip(p, _EDGE, 1.0 - _EDGE)
+        slope = self.link.density(eta, arrays())
         per_eta = w * slope / (p * (1.0 - p))
         return x.T @ (per_eta * (self.outcome - p)), (x * (per_eta * slope)[:, None]).T @ x
 
@@ -192,6 +180,10 @@ class CensoredNormal:
             curved -= (by_u * (weight * r_u * e_u)[:, None]).T @ by_u
             information += curved - (by_u * second[rows][:, None]).T @ by_u
         return score, information
+
+
+Likelihood = Binomial | CensoredNormal
+"""Log likelihood and its derivatives by parameters, shape (k,), over rows of earthquakes."""
 
 
 def olsen(theta: FloatArray, values: Mapping[str, FloatArray]) -> Standardised:

@@ -10,21 +10,19 @@ v0 has a floor, so that v(x) > 0 for every x >= 0.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rbfrag.errors import FitError
-from rbfrag.fragility.fit.clusters import bootstrap, left_out
-from rbfrag.fragility.fit.critical import probabilities
 from rbfrag.fragility.fit.data import FitData
-from rbfrag.fragility.fit.result import Estimates, MethodResult, method_result
+from rbfrag.fragility.fit.maximum_likelihood import held_out_probabilities, probabilities
+from rbfrag.fragility.fit.result import Estimates, MethodResult, bootstrap, left_out, method_result
 from rbfrag.fragility.measures import Term
 from rbfrag.fragility.method import Method, arrays
-from rbfrag.fragility.straight_line import (
+from rbfrag.fragility.methods.wls import (
     NEGATIVE_LIMIT,
     mean_m_s,
     negative_probability,
@@ -53,7 +51,7 @@ FEWEST_BINS = 4
 
 @dataclass(frozen=True, eq=False)
 class Bins:
-    """Bins of equal count over sorted intensities.
+    """Bins over sorted intensities.
 
     Args:
         x: intensities [m/s], rising, shape (n,).
@@ -65,10 +63,15 @@ class Bins:
 
     @classmethod
     def equal_count(cls, x: FloatArray) -> Bins:
-        """Cut rising intensities into bins of equal count, about 20 points each."""
+        """Cut rising intensities into bins of equal count, about 20 points each.
+
+        Points of equal intensity share a bin: it ends with the last of them once it has its count.
+        """
         count = max(FEWEST_BINS, min(MOST_BINS, x.size // POINTS_PER_BIN))
         count = min(count, x.size)
-        return cls(x, np.arange(count, dtype=np.intp) * x.size // count)
+        ends = np.arange(1, count, dtype=np.intp) * x.size // count
+        starts = np.searchsorted(x, x[ends - 1], side="right")
+        return cls(x, np.unique(np.append(0, starts[starts < x.size])))
 
     def sums(self, values: FloatArray) -> FloatArray:
         """Return the sum of the values in each bin."""
@@ -248,15 +251,18 @@ def clustered_line(
     )
 
 
-def fit_wls(data: FitData, method: Method, term: Term, *, seed: int) -> MethodResult:
+def fit_wls(
+    data: FitData, method: Method, term: Term, *, seed: int, resample: bool = True
+) -> MethodResult:
     """Fit y* = c0 + c1 x with variance v(x), the method of the dissertation.
 
     Censored points are left out of the fit (and bias it upwards). The covariance is that of the
-    fits that each leave an earthquake out; a bootstrap by earthquake is reported, too.
+    fits that each leave an earthquake out; a bootstrap by earthquake is reported on request.
 
     Args:
         term: the intensity term, which sets the degree of v(x).
         seed: seed of the bootstrap.
+        resample: whether there is one.
 
     Raises:
         FitError: the line does not rise with intensity, or there is no scatter.
@@ -265,8 +271,15 @@ def fit_wls(data: FitData, method: Method, term: Term, *, seed: int) -> MethodRe
     # line, so both are fitted in turn until neither changes (Carroll and Ruppert 1988).
     form, degree = method.forms[term.name], term.variance_degree
     x, y, events = data.x[data.observed], data.y[data.observed], data.event[data.observed]
+    # Sums follow the values alone, so that names and order of the rows alter no bit.
+    order = np.lexsort((events, y, x))
+    x, y, events = x[order], y[order], events[order]
     bins = Bins.equal_count(x)
-    _reject_without_scatter(x, y)
+    if (y - np.polynomial.Polynomial.fit(x, y, 1)(x)).std() <= 1e-9 * np.abs(y).max():
+        raise FitError(
+            "the critical values lie exactly on a line: without dispersion no probability can be "
+            "fitted; use recorded motions instead of scaled copies of one"
+        )
     fit = iterate(bins, y, np.ones(x.size), degree)
     if fit.parameters[1] <= 0.0:
         raise FitError(
@@ -280,20 +293,21 @@ def fit_wls(data: FitData, method: Method, term: Term, *, seed: int) -> MethodRe
     # The same line by statsmodels, with a covariance clustered by earthquake, as an independent
     # check.
     clustered = clustered_line(x, y, 1.0 / variance, events)
-    samples, unstable = event_bootstrap(
-        bins, y, events, degree, fit.parameters, replicates=REPLICATES, seed=seed
-    )
     in_sample = probabilities(method, form, data, fit.parameters)
     # An earthquake with censored points only has no share in the fit: it is left out already.
-    held_out, density = in_sample.copy(), np.empty(y.size)
+    density = np.empty(y.size)
     jackknife = left_out(
         events, lambda rest: iterate(bins, y, rest.astype(float), degree, fit.parameters).parameters
     )
     for event, part in jackknife.items():
-        event_rows, fitted_rows = data.event == event, events == event
-        held_out[event_rows] = probabilities(method, form, data, part)[event_rows]
+        fitted_rows = events == event
         density[fitted_rows] = _log_density(part, x[fitted_rows], y[fitted_rows])
     steps = np.array(list(jackknife.values())) - fit.parameters
+    samples, unstable = None, 0
+    if resample:
+        samples, unstable = event_bootstrap(
+            bins, y, events, degree, fit.parameters, replicates=REPLICATES, seed=seed
+        )
     mean = mean_m_s(parameters, data.x)
     with np.errstate(divide="ignore", invalid="ignore"):
         ln_residual = np.where(data.observed & (mean > 0.0) & (data.y > 0.0),
@@ -302,7 +316,7 @@ def fit_wls(data: FitData, method: Method, term: Term, *, seed: int) -> MethodRe
         data,
         Estimates(form.parameters, fit.parameters, steps, samples, seed),
         in_sample,
-        held_out,
+        held_out_probabilities(method, form, data, in_sample, jackknife),
         ln_residual=ln_residual,
         scores={
             "log_density_in_sample": float(_log_density(fit.parameters, x, y).mean()),
@@ -328,8 +342,9 @@ def fit_wls(data: FitData, method: Method, term: Term, *, seed: int) -> MethodRe
         },
         warnings=_warnings(data, fit, x, unstable),
     )
-    drawn = {**cast("Mapping[str, object]", result.details["bootstrap"]), "not_stable": unstable}
-    return replace(result, details={**result.details, "bootstrap": drawn})
+    if samples is not None:
+        cast("dict[str, object]", result.details["bootstrap"])["not_stable"] = unstable
+    return result
 
 
 def event_bootstrap(
@@ -370,15 +385,6 @@ def event_bootstrap(
 
     samples = bootstrap(events, fit, replicates=replicates, seed=seed, enough=enough)
     return samples, stable.count(False)
-
-
-def _reject_without_scatter(x: FloatArray, y: FloatArray) -> None:
-    residuals = y - np.polynomial.Polynomial.fit(x, y, 1)(x)
-    if residuals.std() <= 1e-9 * np.abs(y).max():
-        raise FitError(
-            "the critical values lie exactly on a line: without dispersion no probability can be "
-            "fitted; use recorded motions instead of scaled copies of one"
-        )
 
 
 def _log_density(b: FloatArray, x: FloatArray, y: FloatArray) -> FloatArray:

@@ -13,13 +13,12 @@ from rbfrag.db.rows import CombinationTable
 from rbfrag.fragility import describe
 from rbfrag.fragility.fit.line import clustered_line
 from rbfrag.fragility.measures import SINGLE_TERMS, TERMS
-from rbfrag.fragility.model import FragilityModel
-from rbfrag.fragility.model_list import fitted_number
+from rbfrag.fragility.model import IS_ESTIMATED, FragilityModel
 from rbfrag.results.diagnostic import Diagnostic
 from rbfrag.results.numbers import rounded
 from rbfrag.results.result import Result, TextLine, TextTable
 
-_FIELDS = ("standard_errors", "n", "n_censored", "events", "scores", "warnings")
+_FIELDS = ("standard_errors", "n", "n_censored", "events", "scores", "warnings", IS_ESTIMATED)
 
 
 @dataclass(frozen=True, repr=False)
@@ -69,7 +68,7 @@ class FitReport(Result):
             method=row.method,
             coefficients=dict(row.coefficients),
             standard_errors=dict(diagnostics.get("standard_errors", {})),
-            n=fitted_number(diagnostics) or 0,
+            n=describe.fitted_number(diagnostics) or 0,
             n_censored=int(diagnostics.get("n_censored", 0)),
             events=int(diagnostics.get("events", 0)),
             scores=dict(diagnostics.get("scores", {})),
@@ -97,7 +96,7 @@ class FitReport(Result):
         if score is None:
             yield f"Model {self.name}: no score on earthquakes held out"
             return
-        ends = self._score_interval("log_loss_held_out")
+        ends = (self.details.get("score_intervals") or {}).get("log_loss_held_out")
         around = "" if ends is None else f" ({rounded(ends[0])}–{rounded(ends[1])} by earthquakes)"
         yield f"Log loss on earthquakes held out {rounded(score)}{around}; lower is better"
 
@@ -110,14 +109,11 @@ class FitReport(Result):
             yield TextLine("Method", reason)
         if data := describe.fitted_data(self.model.row.diagnostics):
             yield TextLine("Data", data)
+        if condition := self.details.get("where"):
+            yield TextLine("Where", condition)
         strong = self.scores.get("log_loss_held_out_kr05")
         if strong is not None:
             yield TextLine("Score", f"log loss {rounded(strong)} for blocks with k_r ≥ 0.05")
-
-    def _score_interval(self, name: str) -> tuple[float, float] | None:
-        """Return the interval of a score, clustered by earthquake; None where it is unknown."""
-        ends: tuple[float, float] | None = (self.details.get("score_intervals") or {}).get(name)
-        return ends
 
     def tables(self, *, verbose: bool = False) -> Iterator[TextTable]:
         """Yield the parameters; if verbose also counts, what blocks share, and all scores."""
@@ -143,9 +139,10 @@ class FitReport(Result):
                 ("shared by the blocks of one earthquake", "value", "standard error"),
                 [(name, dependence[name], error) for name, error in dependence["errors"].items()],
             )
+        intervals = self.details.get("score_intervals") or {}
         yield TextTable(
             ("score", "value", "low", "high"),
-            [(name, value, *(self._score_interval(name) or (None, None)))
+            [(name, value, *intervals.get(name, (None, None)))
              for name, value in self.scores.items()
              if name.endswith(("_in_sample", "_held_out"))],
         )  # fmt: skip
@@ -194,28 +191,15 @@ class FitReport(Result):
         }
 
 
-@dataclass(frozen=True)
-class PowerLaw:
-    """k_r/PGA = C (ω_m/p)^(-M), fitted by least squares of the logarithms.
-
-    Args:
-        exponent_m_se: standard error of M, clustered by earthquake.
-    """
-
-    exponent_m: float
-    exponent_m_se: float
-    constant_c: float
-    n: int
-
-
-def power_law(table: CombinationTable) -> PowerLaw | None:
-    """Fit equation (4.28): M is the slope of ln(k_r/PGA) on -ln(ω_m/p).
+def power_law(table: CombinationTable) -> dict[str, float] | None:
+    """Fit k_r/PGA = C (ω_m/p)^(-M), equation (4.28), by least squares of the logarithms.
 
     Args:
         table: critical values; all that were found and have a mean period are used.
 
     Returns:
-        None when there are too few points or earthquakes, or all ω_m/p are equal.
+        M with its standard error clustered by earthquake, C and the number of values; None when
+        there are too few points or earthquakes, or all ω_m/p are equal.
     """
     with np.errstate(divide="ignore", invalid="ignore"):
         x = -np.log(2.0 * math.pi / table.tm_s / np.sqrt(table.p2))
@@ -225,12 +209,12 @@ def power_law(table: CombinationTable) -> PowerLaw | None:
     if used.sum() < 3 or events.max() < 1 or np.ptp(x[used]) == 0.0:
         return None
     fit = clustered_line(x[used], y[used], np.ones(int(used.sum())), events.astype(np.intp))
-    return PowerLaw(
-        exponent_m=float(fit.line[1]),
-        exponent_m_se=math.sqrt(fit.covariance[1, 1]),
-        constant_c=math.exp(fit.line[0]),
-        n=int(used.sum()),
-    )
+    return {
+        "exponent_m": float(fit.line[1]),
+        "exponent_m_se": math.sqrt(fit.covariance[1, 1]),
+        "constant_c": math.exp(fit.line[0]),
+        "n": int(used.sum()),
+    }
 
 
 def log_correlations(table: CombinationTable) -> dict[str, float]:

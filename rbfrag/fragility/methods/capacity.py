@@ -13,27 +13,15 @@ toppling (:mod:`rbfrag.fragility.methods.confined`) k_ct and p_ct stand for k_s 
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any
-
-from rbfrag.fragility import fits
-from rbfrag.fragility.method import (
-    NORMAL,
-    ArrayNamespace,
-    BlockParameters,
-    Form,
-    LinearPredictor,
-    MechanicalBound,
-    Method,
-    linear,
-)
+from rbfrag.fragility import method
+from rbfrag.fragility.method import ArrayNamespace, LinearPredictor, Parameters, Values, linear
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.vocabulary.quantities import QUANTITIES
 
 MIDDLE_MAGNITUDE = 6.5
 
 
-def _failure(_: Mapping[str, Any], rotation: float | None) -> str:
+def _failure(_: Values, rotation: float | None) -> str:
     if rotation is None:
         return "failure past recovery"
     return f"a rotation of {rotation:g} degrees or failure past recovery"
@@ -44,7 +32,7 @@ _PARAMETERS = ("b0", "b_ln_excess", "b_ln_z", "b_ln_k")
 
 def capacity_method(
     name: str, kind: str, numbers: tuple[str, str], moves: str, *, criterion: str | None = None
-) -> Method:
+) -> method.Method:
     """Return the method for blocks of a kind that are simulated under scaled records.
 
     Args:
@@ -53,34 +41,33 @@ def capacity_method(
         criterion: name of the criterion of failure, if there are several.
     """
     strength, size = numbers
-    at_rest = MechanicalBound(
+    at_rest = method.MechanicalBound(
         lambda v: v[strength] >= v["pga_g"],
         strength,
         f"{QUANTITIES[strength].symbol}{{{strength}}} is not below PGA{{pga_g}}: "
         "the block does not move",
     )
 
-    def pgv_pga(b: Sequence[float], v: Mapping[str, Any], ns: ArrayNamespace) -> LinearPredictor:
+    def pgv_pga(b: Parameters, v: Values, ns: ArrayNamespace) -> LinearPredictor:
         r = v[strength] / v["pga_g"]
         z = v["p"] * v["pgv_m_s"] / (v["pga_g"] * STANDARD_GRAVITY_M_S2)
         return linear(b, 1.0, ns.log((1.0 - r) / r), ns.log(z), ns.log(v[strength]))
 
-    def pgv_pga_m(b: Sequence[float], v: Mapping[str, Any], ns: ArrayNamespace) -> LinearPredictor:
+    def pgv_pga_m(b: Parameters, v: Values, ns: ArrayNamespace) -> LinearPredictor:
         return linear(b, *pgv_pga(b, v, ns).slopes, v["magnitude"] - MIDDLE_MAGNITUDE)
 
-    return Method(
+    return method.Method(
         name=name,
-        block=BlockParameters(
+        block=method.BlockParameters(
             numbers, kind, strength, size, at_rest, criterion=criterion, points="scaled_records"
         ),
-        link=NORMAL,
+        link=method.NORMAL,
         forms={
-            "pgv_pga_m": Form((*_PARAMETERS, "b_m"), pgv_pga_m, 0, (at_rest,)),
-            "pgv_pga": Form(_PARAMETERS, pgv_pga, 0, (at_rest,)),
+            "pgv_pga_m": method.Form((*_PARAMETERS, "b_m"), pgv_pga_m, 0, (at_rest,)),
+            "pgv_pga": method.Form(_PARAMETERS, pgv_pga, 0, (at_rest,)),
         },
-        reads="outcomes",
         meaning=f"probability that the block {moves}",
-        fit=fits.outcomes,
+        fit="outcomes",
         failure=_failure,
     )
 

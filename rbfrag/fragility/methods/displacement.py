@@ -17,23 +17,15 @@ P = Φ(eta). A rectangular pulse gives the first with c = ln(1/2), b1 = b2 = 1.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable
 from operator import mul
 from typing import Any
 
-from rbfrag.fragility import fits
-from rbfrag.fragility.method import (
-    NORMAL,
-    ArrayNamespace,
-    BlockParameters,
-    Form,
-    LinearPredictor,
-    MechanicalBound,
-    Method,
-)
+from rbfrag.fragility import method
+from rbfrag.fragility.method import ArrayNamespace, LinearPredictor, Parameters, Values
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 
-Formula = Callable[[Sequence[float], Mapping[str, Any], ArrayNamespace], LinearPredictor]
+Formula = Callable[[Parameters, Values, ArrayNamespace], LinearPredictor]
 
 
 def _level(values: dict[str, Any], ns: ArrayNamespace) -> None:
@@ -46,12 +38,12 @@ def _level(values: dict[str, Any], ns: ArrayNamespace) -> None:
     values["sin_phi"] = sin + values["ky"] * cos
 
 
-BLOCK = BlockParameters(
+BLOCK = method.BlockParameters(
     ("ky", "displacement_m"),
     "sliding",
     "ky",
     None,
-    MechanicalBound(
+    method.MechanicalBound(
         lambda v: v["ky"] >= v["pga_g"],
         "ky",
         "k_y{ky} is not below PGA{pga_g}: the block does not move",
@@ -60,7 +52,7 @@ BLOCK = BlockParameters(
     points="displacements",
     adjust=_level,
     rejects=(
-        MechanicalBound(
+        method.MechanicalBound(
             lambda v: (
                 "beta_deg" in v
                 and (abs(v["beta_deg"]) >= 90.0)
@@ -75,10 +67,10 @@ BLOCK = BlockParameters(
 """Blocks known by k_y = tan(φ - β) and the displacement that is too far [m]."""
 
 
-def _eta(further: Callable[[Mapping[str, Any], ArrayNamespace], tuple[Any, ...]]) -> Formula:
+def _eta(further: Callable[[Values, ArrayNamespace], tuple[Any, ...]]) -> Formula:
     """Return the formula with further terms of the median."""
 
-    def formula(b: Sequence[float], v: Mapping[str, Any], ns: ArrayNamespace) -> LinearPredictor:
+    def formula(b: Parameters, v: Values, ns: ArrayNamespace) -> LinearPredictor:
         ky, pgv = v["ky"], v["pgv_m_s"]
         r = ky / v["pga_g"]
         size = ns.log(pgv * pgv / (ky * STANDARD_GRAVITY_M_S2))
@@ -93,7 +85,7 @@ def _eta(further: Callable[[Mapping[str, Any], ArrayNamespace], tuple[Any, ...]]
     return formula
 
 
-def _pgv(b: Sequence[float], v: Mapping[str, Any], ns: ArrayNamespace) -> LinearPredictor:
+def _pgv(b: Parameters, v: Values, ns: ArrayNamespace) -> LinearPredictor:
     ky, pgv = v["ky"], v["pgv_m_s"]
     size = ns.log(pgv * pgv / (ky * STANDARD_GRAVITY_M_S2))
     a = ky / (ns.exp(b[3]) * pgv)
@@ -104,35 +96,34 @@ def _pgv(b: Sequence[float], v: Mapping[str, Any], ns: ArrayNamespace) -> Linear
     return LinearPredictor(eta, slopes, b[4], (0.0, 0.0, 0.0, 0.0, 1.0))
 
 
-METHOD = Method(
+METHOD = method.Method(
     name="displacement",
     block=BLOCK,
-    link=NORMAL,
+    link=method.NORMAL,
     forms={
-        "pgv_pga": Form(
+        "pgv_pga": method.Form(
             ("c", "b1", "b2", "s0", "s1"), _eta(lambda _, __: ()), 0, (BLOCK.at_rest,),
             start=(0.6, 0.9, 3.7, -0.6, 0.9),
             advice="without magnitude, P is overestimated below M 6.4 and underestimated from "
             "M 7.5: give the magnitude",
         ),
-        "pgv_pga_m": Form(
+        "pgv_pga_m": method.Form(
             ("c", "b1", "b2", "b_magnitude", "s0", "s1"),
             _eta(lambda v, _: (v["magnitude"] - 6.5,)), 0, (BLOCK.at_rest,),
             start=(0.2, 0.8, 4.0, 0.4, -0.8, 1.4),
         ),
-        "pgv_pga_ia": Form(
+        "pgv_pga_ia": method.Form(
             ("c", "b1", "b2", "b_arias", "s0", "s1"),
             _eta(lambda v, ns: (ns.log(v["arias_m_s"] / (v["pgv_m_s"] * v["pgv_m_s"])),)),
             0, (BLOCK.at_rest,),
             start=(-0.9, 1.2, 2.7, 0.7, -0.8, 1.0),
         ),
-        "pgv": Form(
+        "pgv": method.Form(
             ("c", "b1", "b2", "ln_kappa", "s0"), _pgv, 0, start=(2.9, 0.2, 2.7, -3.5, 0.4),
         ),
     },
-    reads="critical",
     meaning="probability that the block slides further than the displacement",
-    fit=fits.censored,
+    fit="censored",
     failure=lambda values, _: f"permanent displacement above {values['displacement_m']:g} m",
     median_of="displacement_m",
 )  # fmt: skip

@@ -11,47 +11,36 @@ docs/theory/fragility.md. With SA(1.0) alone, V_1 = SA g/2π and k' of
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any
-
-from rbfrag.fragility import fits, method
-from rbfrag.fragility.method import (
-    ArrayNamespace,
-    Form,
-    LinearPredictor,
-    Method,
-    SizeFactor,
-    linear,
-    log_strength,
-)
+from rbfrag.fragility import method
+from rbfrag.fragility.method import ArrayNamespace, LinearPredictor, Parameters, Values, linear
 
 
-def _eta(b: Sequence[float], v: Mapping[str, Any], ns: ArrayNamespace) -> LinearPredictor:
+def _eta(b: Parameters, v: Values, ns: ArrayNamespace) -> LinearPredictor:
     ratio = ns.log(v["intensity_m_s"] / v["y_m_s"])
     return linear(b, 1.0, ratio) if len(b) == 2 else linear(b, 1.0, ratio, ns.log(v["p"]))
 
 
-def _spectral(b: Sequence[float], v: Mapping[str, Any], ns: ArrayNamespace) -> LinearPredictor:
+def _spectral(b: Parameters, v: Values, ns: ArrayNamespace) -> LinearPredictor:
     x, l = v["intensity_m_s"], ns.log(v["p"])  # noqa: E741  as in the formula
-    return linear(b, 1.0, l, l * l, ns.log(x / v["y_m_s"]), ns.log(x), log_strength(v, ns))
+    return linear(b, 1.0, l, l * l, ns.log(x / v["y_m_s"]), ns.log(x), method.log_strength(v, ns))
 
 
-def _form(size_factor: SizeFactor | None) -> Form:
-    return Form(
+def _form(size_factor: method.SizeFactor | None) -> method.Form:
+    return method.Form(
         ("b0", "b_ln_x_over_y", "b_ln_p"), _eta, 4, size_factor=size_factor,
         terms=("1", r"\ln(x/y)", r"\ln p"),
     )  # fmt: skip
 
 
-_OF_SIZE = SizeFactor(0.18, 0.06)
-_SPECTRAL = Form(
+_OF_SIZE = method.SizeFactor(0.18, 0.06)
+_SPECTRAL = method.Form(
     ("b0", "b_size", "b_size_squared", "b_ln_x_over_y", "b_ln_x", "b_strength"),
     _spectral, 0, size_factor=_OF_SIZE,
     terms=("1", r"\ln p", r"\ln^2 p", r"\ln(x/y)", r"\ln x", "k'"),
     where=r"k' = \ln(1 + k_r/0.3)",
 )  # fmt: skip
 
-METHOD = Method(
+METHOD = method.Method(
     name="logistic",
     block=method.TOPPLING_BLOCK,
     link=method.LOGIT,
@@ -59,11 +48,10 @@ METHOD = Method(
         "pgv": _form(_OF_SIZE),
         "pga_tm": _form(_OF_SIZE),
         "pgd_tm": _form(None),
-        "xp": _form(SizeFactor(0.30)),
+        "xp": _form(method.SizeFactor(0.30)),
         "sa10": _SPECTRAL,
     },
-    reads="outcomes",
     meaning=method.OF_OUTCOME,
-    fit=fits.outcomes,
+    fit="outcomes",
     exponent="b_ln_p",
 )

@@ -7,22 +7,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any
-
-from rbfrag.fragility import fits
-from rbfrag.fragility.method import (
-    NORMAL,
-    OF_CRITICAL,
-    TOPPLING_BLOCK,
-    ArrayNamespace,
-    Form,
-    LinearPredictor,
-    Method,
-)
+from rbfrag.fragility import method
+from rbfrag.fragility.method import ArrayNamespace, LinearPredictor, Parameters, Values
 
 
-def _eta(b: Sequence[float], v: Mapping[str, Any], ns: ArrayNamespace) -> LinearPredictor:
+def _eta(b: Parameters, v: Values, ns: ArrayNamespace) -> LinearPredictor:
     log_x = ns.log(v["intensity_m_s"])
     per = ns.exp(-b[2])
     from_line = b[0] + b[1] * log_x - ns.log(v["y_m_s"])
@@ -34,18 +23,17 @@ def _eta(b: Sequence[float], v: Mapping[str, Any], ns: ArrayNamespace) -> Linear
     return LinearPredictor(eta, (per, log_x * per, -eta, log_p * per), b[2], (0.0, 0.0, 1.0, 0.0))
 
 
-_FORM = Form(
+_FORM = method.Form(
     ("ln_median", "slope", "ln_sigma", "m_minus_1"), _eta, 5,
     terms=("1", r"\ln x", "", r"\ln p"), equation=r"(<sum> - \ln y)/<exp ln_sigma>",
 )  # fmt: skip
 
-METHOD = Method(
+METHOD = method.Method(
     name="lognormal",
-    block=TOPPLING_BLOCK,
-    link=NORMAL,
+    block=method.TOPPLING_BLOCK,
+    link=method.NORMAL,
     forms=dict.fromkeys(("pgv", "pga_tm", "pgd_tm", "xp"), _FORM),
-    reads="critical",
-    meaning=OF_CRITICAL,
-    fit=fits.log_line,
+    meaning=method.OF_CRITICAL,
+    fit="log_line",
     exponent="m_minus_1",
 )

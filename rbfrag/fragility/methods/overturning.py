@@ -12,21 +12,12 @@ again towards weak shaking. How well the models do stands in docs/theory/rocking
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from typing import Any
 
-from rbfrag.fragility import fits, method
+from rbfrag.fragility import method
 from rbfrag.fragility.measures import spectral_velocity_m_s
-from rbfrag.fragility.method import (
-    ArrayNamespace,
-    BlockParameters,
-    Form,
-    LinearPredictor,
-    MechanicalBound,
-    Method,
-    SizeFactor,
-    linear,
-)
+from rbfrag.fragility.method import ArrayNamespace, LinearPredictor, Parameters, Values, linear
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 
 LEAST_RESTITUTION = 1e-6
@@ -44,7 +35,7 @@ def _restitution(values: dict[str, Any], ns: ArrayNamespace) -> None:
     values["speed_loss"] = ns.sqrt(ns.maximum(1.0 - values["restitution"], 0.0))
 
 
-BLOCK = BlockParameters(
+BLOCK = method.BlockParameters(
     ("p2", "kr"),
     "rocking",
     "kr",
@@ -56,7 +47,7 @@ BLOCK = BlockParameters(
     fractions=("restitution",),
     adjust=_restitution,
     rejects=(
-        MechanicalBound(
+        method.MechanicalBound(
             lambda v: (v["restitution"] <= 0.0) | (v["restitution"] > 1.0),
             "restitution",
             "must be above 0 and up to 1 (a block that comes to rest at its first impact is not "
@@ -69,31 +60,31 @@ BLOCK = BlockParameters(
 """Free-standing blocks known by p² [1/s²], k_r = tan(critical angle) and, if given, restitution."""
 
 
-def _log_odds(v: Mapping[str, Any], ns: ArrayNamespace) -> Any:
+def _log_odds(v: Values, ns: ArrayNamespace) -> Any:
     r = v["kr"] / v["pga_g"]
     return ns.log(r / (1.0 - r))
 
 
-def _log_z(v: Mapping[str, Any], ns: ArrayNamespace) -> Any:
+def _log_z(v: Values, ns: ArrayNamespace) -> Any:
     return ns.log(v["p"] * v["intensity_m_s"] / (v["pga_g"] * STANDARD_GRAVITY_M_S2))
 
 
-def _small_magnitude(v: Mapping[str, Any], ns: ArrayNamespace) -> Any:
+def _small_magnitude(v: Values, ns: ArrayNamespace) -> Any:
     """Return M - 6.5 below 6.5, otherwise 0."""
     return ns.minimum(v["magnitude"], _LARGE_MAGNITUDE) - _LARGE_MAGNITUDE
 
 
-def _over_pgv(measure: str, period_s: float) -> Callable[[Mapping[str, Any], ArrayNamespace], Any]:
+def _over_pgv(measure: str, period_s: float) -> Callable[[Values, ArrayNamespace], Any]:
     return lambda v, ns: ns.log(spectral_velocity_m_s(v[measure], period_s) / v["pgv_m_s"])
 
 
-def _over_pga(measure: str, period_s: float) -> Callable[[Mapping[str, Any], ArrayNamespace], Any]:
+def _over_pga(measure: str, period_s: float) -> Callable[[Values, ArrayNamespace], Any]:
     # g drops out
     return lambda v, ns: ns.log(v[measure] / v["pga_g"] * (period_s / (2.0 * math.pi)))
 
 
 _LARGE_MAGNITUDE = 6.5
-_FEATURES: Mapping[str, tuple[str, Callable[[Mapping[str, Any], ArrayNamespace], Any]]] = {
+_FEATURES: Mapping[str, tuple[str, Callable[[Values, ArrayNamespace], Any]]] = {
     "logit_r": (r"\ln\frac{r}{1 - r}", _log_odds),
     "ln_z": (r"\ln z", _log_z),
     "ln_y_over_x": (r"\ln(y/x)", lambda v, ns: ns.log(v["y_m_s"] / v["intensity_m_s"])),
@@ -116,7 +107,7 @@ def _form(
     b: float = 0.0,
     of_pga: bool = True,
     advice: str = "",
-) -> Form:
+) -> method.Form:
     """Return the formula of a constant, features, and products of two features.
 
     Args:
@@ -124,19 +115,19 @@ def _form(
         a: A of the factor h of size.
         b: its B.
         of_pga: whether PGA is read, which a block's strength is bounded by.
-        advice: as of :class:`Form`.
+        advice: as of :class:`~rbfrag.fragility.method.Form`.
     """
     names = features.split()
     parts = {name: _FEATURES[name] for name in names}
 
-    def formula(b: Sequence[float], v: Mapping[str, Any], ns: ArrayNamespace) -> LinearPredictor:
+    def formula(b: Parameters, v: Values, ns: ArrayNamespace) -> LinearPredictor:
         features = {name: of(v, ns) for name, (_, of) in parts.items()}
         return linear(b, 1.0, *features.values(), *[features[x] * features[y] for x, y in products])
 
-    return Form(
+    return method.Form(
         ("b0", *(f"b_{name}" for name in names), *(f"b_{x}_{y}" for x, y in products)),
         formula, 0, (BLOCK.at_rest,) if of_pga else (),
-        size_factor=SizeFactor(a, b) if a else None,
+        size_factor=method.SizeFactor(a, b) if a else None,
         terms=(
             "1", *(text for text, _ in parts.values()),
             *(rf"{parts[x][0]}\,{parts[y][0]}" for x, y in products),
@@ -147,7 +138,7 @@ def _form(
 
 _LOSS_AND_STRENGTH, _SQUARE = ("s", "logit_r"), ("ln_p", "ln_p")
 
-METHOD = Method(
+METHOD = method.Method(
     name="overturning",
     block=BLOCK,
     link=method.LOGIT,
@@ -169,8 +160,7 @@ METHOD = Method(
             "would lower the log loss on earthquakes left out from 0.22 to 0.19 or 0.17",
         ),
     },
-    reads="outcomes",
     meaning="probability that the free-standing block overturns",
-    fit=fits.outcomes,
+    fit="outcomes",
     failure=lambda _, __: "overturning",
 )  # fmt: skip

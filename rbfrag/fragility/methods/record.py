@@ -8,39 +8,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any
-
-from rbfrag.fragility import fits, method
-from rbfrag.fragility.method import (
-    ArrayNamespace,
-    Form,
-    LinearPredictor,
-    Method,
-    SizeFactor,
-    linear,
-)
+from rbfrag.fragility import method
+from rbfrag.fragility.method import ArrayNamespace, LinearPredictor, Parameters, Values, linear
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 
 
-def _eta(b: Sequence[float], v: Mapping[str, Any], ns: ArrayNamespace) -> LinearPredictor:
+def _eta(b: Parameters, v: Values, ns: ArrayNamespace) -> LinearPredictor:
     x = v["intensity_m_s"]
     log_s = ns.log(v["p"] * x / (v["pga_g"] * STANDARD_GRAVITY_M_S2))
     return linear(b, 1.0, ns.log(x / v["y_m_s"]), log_s)
 
 
-METHOD = Method(
+METHOD = method.Method(
     name="record",
     block=method.TOPPLING_BLOCK,
     link=method.LOGIT,
     forms={
-        "xp": Form(
+        "xp": method.Form(
             ("b0", "b_ln_xp_over_y", "b_ln_s"), _eta, 0,
-            (method.ABOVE_SPECTRUM, method.NOT_LIFTED), size_factor=SizeFactor(0.18),
+            (method.ABOVE_SPECTRUM, method.NOT_LIFTED), size_factor=method.SizeFactor(0.18),
             terms=("1", r"\ln(x/y)", r"\ln s"), where=r"s = p\,x/(\mathrm{PGA}\,g)",
         )
     },
-    reads="outcomes",
     meaning=method.OF_OUTCOME,
-    fit=fits.outcomes,
+    fit="outcomes",
 )  # fmt: skip

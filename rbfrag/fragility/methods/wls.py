@@ -8,22 +8,41 @@ Equations (4.28)-(4.31) of Gibson's dissertation; (1) and (2) of docs/theory/fra
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator
 from typing import Any
 
-from rbfrag.fragility import fits, method
-from rbfrag.fragility.method import ArrayNamespace, FittedVariance, Form, LinearPredictor, Method
-from rbfrag.fragility.straight_line import (
-    NEGATIVE_LIMIT,
-    mean_m_s,
-    negative_probability,
-    rise,
-    variance_m2_s2,
-)
+from rbfrag.fragility import method
+from rbfrag.fragility.method import ArrayNamespace, LinearPredictor, Parameters, Values
 from rbfrag.results.numbers import exact_percent
 
+NEGATIVE_LIMIT = 0.025
+"""Probability of a negative critical velocity above which a straight line is doubted."""
 
-def _eta(b: Sequence[float], v: Mapping[str, Any], ns: ArrayNamespace) -> LinearPredictor:
+
+def mean_m_s(b: Parameters, x: Any) -> Any:
+    """Return the mean critical toppling velocity c0 + c1 x [m/s] at intensity x [m/s]."""
+    return x * b[1] + b[0]
+
+
+def variance_m2_s2(b: Parameters, x: Any) -> Any:
+    """Return the variance v(x) [m²/s²] of the critical toppling velocity at intensity x [m/s]."""
+    if len(b) > 4:
+        return (x * b[4] + b[3]) * x + b[2]
+    return x * b[3] + b[2]
+
+
+def negative_probability(b: Parameters, x: Any, ns: ArrayNamespace) -> Any:
+    """Return the model's probability of negative critical velocities at x."""
+    return ns.ndtr(-(mean_m_s(b, x) / ns.sqrt(variance_m2_s2(b, x))))
+
+
+def rise(b: Parameters, x: Any, y: Any) -> Any:
+    """Return v^(3/2) deta/dx, negative where P would decrease with increasing intensity."""
+    slope = b[3] + 2.0 * b[4] * x if len(b) > 4 else b[3]
+    return variance_m2_s2(b, x) * b[1] - (mean_m_s(b, x) - y) * slope * 0.5
+
+
+def _eta(b: Parameters, v: Values, ns: ArrayNamespace) -> LinearPredictor:
     x = v["intensity_m_s"]
     variance = variance_m2_s2(b, x)
     per = 1.0 / ns.sqrt(variance)
@@ -33,9 +52,7 @@ def _eta(b: Sequence[float], v: Mapping[str, Any], ns: ArrayNamespace) -> Linear
     return LinearPredictor(eta, slopes if len(b) == 4 else (*slopes, by_v * x * x))
 
 
-def _doubts(
-    b: Sequence[float], v: Mapping[str, Any], ns: ArrayNamespace
-) -> Iterator[tuple[Any, str, str]]:
+def _doubts(b: Parameters, v: Values, ns: ArrayNamespace) -> Iterator[tuple[Any, str, str]]:
     outside = "is outside the range where the straight-line normal model makes sense"
     yield (
         negative_probability(b, v["intensity_m_s"], ns) > NEGATIVE_LIMIT,
@@ -50,24 +67,22 @@ def _doubts(
     )
 
 
-_LINE = Form(
+_LINE = method.Form(
     ("c0", "c1", "v0", "v1"), _eta, 6,
     terms=("1", "x", "", ""), equation=r"(<sum> - y)/\sigma", where=r"\sigma^2 = <v0><+v1>\,x",
 )  # fmt: skip
-_QUADRATIC = Form(
+_QUADRATIC = method.Form(
     ("c0", "c1", "v0", "v1", "v2"), _eta, 6,
     terms=("1", "x", "", "", ""), equation=r"(<sum> - y)/\sigma",
     where=r"\sigma^2 = <v0><+v1>\,x<+v2>\,x^2",
 )  # fmt: skip
 
-METHOD = Method(
+METHOD = method.Method(
     name="wls",
     block=method.TOPPLING_BLOCK,
     link=method.NORMAL,
     forms={"pgv": _LINE, "pga_tm": _LINE, "pgd_tm": _QUADRATIC, "xp": _LINE},
-    reads="critical",
     meaning=method.OF_CRITICAL,
-    fit=fits.line,
+    fit="line",
     doubts=_doubts,
-    fitted_variance=FittedVariance(mean_m_s, variance_m2_s2),
 )

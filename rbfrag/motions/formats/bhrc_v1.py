@@ -11,7 +11,7 @@ import re
 from collections.abc import Iterator
 
 from rbfrag.motions.direction import azimuth_deg, is_vertical_name
-from rbfrag.motions.text.record_file import HeaderField, ParsedTrace, RecordFile, number_or_none
+from rbfrag.motions.record_file import HeaderField, ParsedTrace, RecordFile, number_or_none
 
 FORMAT = "BHRC V1"
 

@@ -14,8 +14,7 @@ import re
 from collections.abc import Iterator
 from dataclasses import replace
 
-from rbfrag.motions.text.file import field_layout
-from rbfrag.motions.text.record_file import (
+from rbfrag.motions.record_file import (
     Count,
     HeaderField,
     ParsedTrace,
@@ -23,6 +22,7 @@ from rbfrag.motions.text.record_file import (
     RecordFile,
     peak_of,
 )
+from rbfrag.motions.text import field_layout
 
 FORMAT = "CDMG V1"
 

@@ -15,8 +15,8 @@ import re
 from collections.abc import Iterator
 
 from rbfrag.motions.direction import is_vertical_name
-from rbfrag.motions.text.file import field_layout, finite_number
-from rbfrag.motions.text.record_file import HeaderField, ParsedTrace, RecordFile, peak_of
+from rbfrag.motions.record_file import HeaderField, ParsedTrace, RecordFile, peak_of
+from rbfrag.motions.text import field_layout, finite_number
 
 FORMAT = "COSMOS V1c/V2c"
 

@@ -17,8 +17,8 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 
-from rbfrag.motions.text.file import field_layout
-from rbfrag.motions.text.record_file import HeaderField, ParsedTrace, RecordFile, peak_of
+from rbfrag.motions.record_file import HeaderField, ParsedTrace, RecordFile, peak_of
+from rbfrag.motions.text import field_layout
 
 FORMAT = "CSMIP/CDMG V2"
 

@@ -14,7 +14,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 
-from rbfrag.motions.text.record_file import HeaderField, ParsedTrace, PeakField, RecordFile
+from rbfrag.motions.record_file import HeaderField, ParsedTrace, PeakField, RecordFile
 
 FORMAT = "CSMNC text"
 

@@ -9,8 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 
-from rbfrag.motions.text.file import field_layout
-from rbfrag.motions.text.record_file import (
+from rbfrag.motions.record_file import (
     Count,
     HeaderField,
     NamedFields,
@@ -20,6 +19,7 @@ from rbfrag.motions.text.record_file import (
     RecordFile,
     number_or_none,
 )
+from rbfrag.motions.text import field_layout
 
 FORMAT = "CWB dat"
 

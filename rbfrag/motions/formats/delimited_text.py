@@ -6,6 +6,10 @@ line with the names of the columns. The unit comes from there, or from the calle
     # Time Series: Chi-Chi, Taiwan 1999 - TCU068-090
     # Time (s),Acceleration (g's)
     0.0,-6.67772E-4
+
+Three further layouts are read: several components, each with a named column; accelerations alone
+below a title and a line ``npts dt`` (eqsig); and accelerations alone, row by row in rows of equal
+length without a header, where the caller gives interval and unit (OpenSees).
 """
 
 from __future__ import annotations
@@ -16,9 +20,9 @@ from itertools import pairwise
 from pathlib import Path
 
 from rbfrag.errors import InputError, MotionFileError
-from rbfrag.motions.text.file import read_text
-from rbfrag.motions.text.record_file import HeaderField, ParsedTrace, RecordFile, positive_number
-from rbfrag.motions.text.times import sampling_interval
+from rbfrag.motions.direction import is_vertical_name
+from rbfrag.motions.record_file import HeaderField, ParsedTrace, RecordFile, positive_number
+from rbfrag.motions.text import read_text, sampling_interval
 from rbfrag.motions.units import acceleration_unit
 
 FORMAT = "delimited text"
@@ -34,8 +38,12 @@ LONGEST_HEADER_LINE = 500
 _NUMBER_LIKE = re.compile(
     r"[+-]?(?:(?:\d+(?:\.\d*)?|\.\d+)(?:[ed][+-]?\d+)?|nan|inf|infinity)", re.IGNORECASE
 )
+_FLOAT = re.compile(r"[+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:e[+-]?\d{1,2})?", re.IGNORECASE | re.ASCII)
 _DECIMAL_COMMA = re.compile(r"\s*[+-]?\d*,\d+(?:[eE][+-]?\d+)?\s*[;\s]\s*[+-]?\d*,\d+\S*\s*")
 
+
+_QUANTITY_AND_UNIT = re.compile(r"^acc[a-z]*[\s_.:-]*|[(\[{].*$", re.IGNORECASE)
+"""What stands around the direction in the name of a column: ``acc_NS(gal)``."""
 
 _ACCELERATION = re.compile(r"(?<![A-Za-z])(?:acc|a(?![A-Za-z]))", re.IGNORECASE)
 _OTHER_QUANTITY = re.compile(r"(?<![A-Za-z])(vel|displ?)[a-z]*", re.IGNORECASE)
@@ -87,7 +95,7 @@ def recognises(head: str) -> bool:
 
 
 def parse(file: RecordFile) -> Iterator[ParsedTrace]:
-    """Yield the only trace of a delimited text file; such files have no number of samples."""
+    """Yield the trace of a delimited text file, or those of its named columns."""
     lines = file.lines
     start = _first_data_line(lines)
     header = [
@@ -96,37 +104,141 @@ def parse(file: RecordFile) -> Iterator[ParsedTrace]:
         if line.strip()
     ]
     rows = _rows(file, start)
-    unit = _stated_unit(file, header)
+    size = _size(rows)
+    names = _column_names(header, len(rows[0][1]))
+    if size:
+        rows = rows[1:]
+    elif len(rows[0][1]) > 2 and not names:
+        yield _wrapped(file, header, rows)
+        return
+    for number, fields in rows:
+        if len(fields) != len(rows[0][1]):
+            raise file.error(
+                f"{lines[number - 1].strip()[:60]!r} does not have {len(rows[0][1])} columns like "
+                "the rows above: repair the line or export the record again",
+                number,
+            )
     numbers = [number for number, _ in rows]
     columns = [[fields[place] for _, fields in rows] for place in range(len(rows[0][1]))]
-    if len(columns) == 1:
+    if names:
+        yield from _components(file, header, names, columns, numbers)
+        return
+    unit = _stated_unit(file, header)
+    if size or len(columns) == 1:
         samples = file.numbers(columns[0], lambda: numbers, "acceleration")
         _reject_gaps(file, rows)
-        dt, remark = _interval_of_list(file)
+        dt, remark = (file.dt(size[1]), "") if size else _interval_of_list(file)
     else:
-        times = file.numbers(columns[0], lambda: numbers, "time")
         samples = file.numbers(columns[1], lambda: numbers, "acceleration")
-        tokens = [token.strip() for token in columns[0]]
-        dt = sampling_interval(file.path, tokens, times, numbers, file.dt_s)
-        first_s = float(times[0])
-        remark = f"times in the file start at {first_s:g} s; here they start at 0"
-        if first_s == 0.0:
-            remark = ""
+        dt, remark = _interval_of_times(file, columns[0], numbers)
     # what a title "# Northridge 1994 - VSP-360" says
     title = _TITLE.fullmatch(header[0][1].rstrip()) if header else None
-    names = title.group("event", "station", "component") if title else ("", "", "")
-    event, station, component = names
+    event, station, component = title.group("event", "station", "component") if title else ("",) * 3
     yield ParsedTrace(
         samples,
         dt,
         unit,
-        None,
+        file.count(size[0], "number of samples") if size else None,
         component,
         station=station,
         event=event,
         recording=f"{event} {station}" if event and station else "",
         remarks=(remark,) if remark else (),
     )
+
+
+def _size(rows: list[tuple[int, list[str]]]) -> tuple[HeaderField, HeaderField] | None:
+    """Return number of samples and interval of a line ``npts dt`` above a list, or None."""
+    (line, fields), *below = rows
+    if len(fields) != 2 or not fields[0].strip().isdigit() or not below or len(below[0][1]) != 1:
+        return None
+    return HeaderField(fields[0].strip(), line), HeaderField(fields[1].strip(), line)
+
+
+def _column_names(header: Header, width: int) -> list[HeaderField]:
+    """Return the names of a time column and of several more; empty where the header has none."""
+    line, text = header[-1] if header else (0, "")
+    names = [HeaderField(name.strip(), line) for name in _fields(text.lstrip(COMMENT))]
+    return names if width > 2 and len(names) == width and _TIME.search(names[0].text) else []
+
+
+def _components(
+    file: RecordFile,
+    header: Header,
+    names: list[HeaderField],
+    columns: list[list[str]],
+    numbers: list[int],
+) -> Iterator[ParsedTrace]:
+    """Yield the named columns of acceleration, each in the unit of its name or of the header."""
+    _check_columns(file, header[-1:])
+    dt, remark = _interval_of_times(file, columns[0], numbers)
+    for name, column in zip(names[1:], columns[1:], strict=True):
+        spelling = next((text for _, text in _spellings([(name.line, name.text)])), None)
+        component = _QUANTITY_AND_UNIT.sub("", name.text).strip() or name.text
+        is_acceleration = _ACCELERATION.search(name.text) or (spelling and _is_unit(spelling))
+        if not is_acceleration and is_vertical_name(component) is None:
+            raise file.error(
+                f"the column {name.text!r} is not an acceleration: keep the time and the "
+                "components' accelerations",
+                name.line,
+            )
+        yield ParsedTrace(
+            file.numbers(column, lambda: numbers, "acceleration"),
+            dt,
+            HeaderField(spelling, name.line) if spelling else _stated_unit(file, header[:-1]),
+            None,
+            component,
+            recording=file.path.name,
+            remarks=(remark,) if remark else (),
+        )
+
+
+def _wrapped(file: RecordFile, header: Header, rows: list[tuple[int, list[str]]]) -> ParsedTrace:
+    """Return accelerations printed row by row; interval and unit are the caller's."""
+    (first, fields), *_, (last, _) = rows
+    width = len(fields)
+    if header or file.dt_s is None or file.units is None or _counts_up([row[0] for _, row in rows]):
+        raise file.error(
+            f"{width} columns without names: keep two, the time and one component's acceleration; "
+            "where the rows hold one component's values in turn, give its interval and unit "
+            "(dt_s, units)",
+            first,
+            fields=("dt_s", "units"),
+        )
+    _reject_gaps(file, rows)
+    for number, row in rows:
+        if len(row) != width and (number < last or len(row) > width):
+            raise file.error(
+                f"the line has {len(row)} values, not {width} as the first: repair the line or "
+                "export the record again",
+                number,
+            )
+    tokens = [field for _, row in rows for field in row]
+    samples = file.numbers(
+        tokens, lambda: [number for number, row in rows for _ in row], "acceleration"
+    )
+    remark = f"{width} values a row were read row by row, with the dt and unit that were given"
+    return ParsedTrace(samples, file.dt_s, None, None, "", recording="", remarks=(remark,))
+
+
+def _counts_up(column: list[str]) -> bool:
+    """Return whether a column is one of times or of row numbers, not of accelerations."""
+    numbers = [float(field) for field in column if _is_number(field)]
+    steps = [later - earlier for earlier, later in pairwise(numbers)]
+    if len(steps) < 2 or min(steps) <= 0.0:
+        return False
+    return len(steps) > 3 or max(steps) <= 1.001 * min(steps)
+
+
+def _interval_of_times(
+    file: RecordFile, column: list[str], numbers: list[int]
+) -> tuple[float, str]:
+    """Return the sampling interval of a column of times, and a sentence on where they start."""
+    times = file.numbers(column, lambda: numbers, "time")
+    tokens = [token.strip() for token in column]
+    dt = sampling_interval(file.path, tokens, times, numbers, file.dt_s)
+    first_s = float(times[0])
+    return dt, f"times in the file start at {first_s:g} s; here they start at 0" if first_s else ""
 
 
 def _mark(row: str) -> str | None:
@@ -143,6 +255,10 @@ def _numeric(row: str) -> list[bool]:
     return [
         bool(_NUMBER_LIKE.fullmatch(field.strip().replace(decimal, "."))) for field in _fields(row)
     ]
+
+
+def _is_number(field: str) -> bool:
+    return bool(_FLOAT.fullmatch(field.strip()))
 
 
 def _has_decimal_commas(row: str) -> bool:
@@ -166,7 +282,7 @@ def _first_data_line(lines: list[str]) -> int:
 
 
 def _rows(file: RecordFile, start: int) -> list[tuple[int, list[str]]]:
-    """Line number and fields of every row, all of one width."""
+    """Return line number and fields of every row."""
     lines = file.lines
     numbered = [(n, line) for n, line in enumerate(lines[start:], start + 1) if line.strip()]
     if not numbered:
@@ -177,23 +293,7 @@ def _rows(file: RecordFile, start: int) -> list[tuple[int, list[str]]]:
         raise file.error(
             f"{top.strip()!r} has decimal commas: write decimal points, as in 0.005", first
         )
-    rows = [(number, line.split(mark)) for number, line in numbered]
-    fields = rows[0][1]
-    width = len(fields)
-    if width > 2:
-        raise file.error(
-            f"{width} columns: keep two, the time and one component's acceleration, or one with "
-            "the acceleration alone",
-            first,
-        )
-    for number, fields in rows:
-        if len(fields) != width:
-            raise file.error(
-                f"{lines[number - 1].strip()[:60]!r} does not have {width} columns like the rows "
-                "above: repair the line or export the record again",
-                number,
-            )
-    return rows
+    return [(number, line.split(mark)) for number, line in numbered]
 
 
 def _interval_of_list(file: RecordFile) -> tuple[float, str]:

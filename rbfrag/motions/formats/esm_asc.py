@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 
-from rbfrag.motions.text.record_file import NamedFields, ParsedTrace, RecordFile, peak_of
+from rbfrag.motions.record_file import NamedFields, ParsedTrace, RecordFile, peak_of
 
 FORMAT = "ESM ASC"
 

@@ -12,7 +12,7 @@ import re
 from collections.abc import Iterator
 from dataclasses import replace
 
-from rbfrag.motions.text.record_file import HeaderField, ParsedTrace, RecordFile, peak_of
+from rbfrag.motions.record_file import HeaderField, ParsedTrace, RecordFile, peak_of
 
 FORMAT = "GeoNet V2A"
 

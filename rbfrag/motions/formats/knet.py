@@ -13,7 +13,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from rbfrag.motions.polarity import FloatArray
-from rbfrag.motions.text.record_file import Count, HeaderField, ParsedTrace, RecordFile, peak_of
+from rbfrag.motions.record_file import Count, HeaderField, ParsedTrace, RecordFile, peak_of
 
 FORMAT = "K-NET/KiK-net ASCII"
 

@@ -1,7 +1,8 @@
 """miniSEED 2 and 3: counts in binary records of one channel each, which pymseed unpacks.
 
-Neither unit nor gain is in the file: the StationXML of the station states the gain as the
+Neither unit nor gain is in the file: a StationXML file in the same folder gives the gain as the
 sensitivity of the channel [counts/(m/s²)]. Times of successive records prove the interval.
+Channels of other quantities, and those that the caller does not name, are skipped.
 """
 
 from __future__ import annotations
@@ -9,12 +10,14 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
+from fnmatch import fnmatchcase
 from typing import Any
 
 import numpy as np
 
 from rbfrag.errors import MissingExtraError, UnitNotStatedError
-from rbfrag.motions.text.record_file import HeaderField, ParsedTrace, RecordFile
+from rbfrag.motions.record_file import HeaderField, ParsedTrace, RecordFile
+from rbfrag.motions.station_xml import sensitivities
 
 FORMAT = "miniSEED"
 
@@ -46,20 +49,66 @@ def parse(file: RecordFile) -> Iterator[ParsedTrace]:
     warnings = pymseed.get_error_messages()
     if any("integrity" in item for item in warnings):
         raise _damaged(file, warnings[0])
-    channels = [(item.sourceid, list(item)) for item in traces]
+    channels = [(_codes(file, item.sourceid), list(item)) for item in traces]
     if not channels:
         raise file.error("the file has no samples: request the record again")
+    present = [".".join(codes[2:]).removeprefix(".") for codes, _ in channels]
+    if file.channel is not None:
+        patterns = [word.strip().upper() for word in file.channel.split(",")]
+        channels = [
+            (codes, segments) for codes, segments in channels
+            if any(fnmatchcase(name, pattern) for pattern in patterns
+                   for name in (codes[3], ".".join(codes[2:])))
+        ]  # fmt: skip
+        if not channels:
+            raise file.error(
+                f"no channel {file.channel}: the file has {', '.join(present)}",
+                fields=("channel",),
+            )
+    skipped = [codes[3] for codes, _ in channels if codes[3][1] not in ACCELEROMETERS]
+    channels = [(codes, segments) for codes, segments in channels
+                if codes[3][1] in ACCELEROMETERS]  # fmt: skip
+    if not channels:
+        raise file.error(
+            f"{', '.join(skipped)}: not an accelerometer channel (code {skipped[0][1]}): request "
+            "the channels HN or EN of the station"
+        )
+    remarks = []
+    if skipped:
+        remarks.append(f"channels of other quantities were skipped: {', '.join(skipped)}")
+    stations = sorted({".".join(codes[:2]) for codes, _ in channels})
+    if len(stations) > 1:
+        remarks.append(f"the file holds channels of several stations: {', '.join(stations[:5])}")
     start = min(segments[0].starttime_str() for _, segments in channels)
-    stations = sorted({".".join(source.split("_")[:2]) for source, _ in channels})
-    several = f"the file holds channels of several stations: {', '.join(stations[:5])}"
-    for index, (source, segments) in enumerate(channels):
-        trace = _channel(file, index, source, segments, start[:19])
+    gains = {} if file.gain is not None else sensitivities(file.path.parent)
+    for index, (codes, segments) in enumerate(channels):
+        of_caller = file.gain.get(index) if isinstance(file.gain, Mapping) else file.gain
+        gain, source = (of_caller, "") if of_caller is not None else gains.get(codes, (None, ""))
+        if gain is None:
+            raise UnitNotStatedError(
+                file.path,
+                f"{codes[3]} is in counts without a gain: give gain in counts/(m/s2), the "
+                "sensitivity in the StationXML of the station, or put that file into the same "
+                "folder",
+                fields=("gain",),
+            )
+        trace = _channel(file, codes, segments, gain, start[:19])
+        on_gain = (f"the gain of {gain:g} counts/(m/s2) is from {source}",) if source else ()
         yield replace(
             trace,
             is_partial=bool(remark),
             remark_if_partial=remark,
-            remarks=(*trace.remarks, several) if len(stations) > 1 else trace.remarks,
+            remarks=(*trace.remarks, *on_gain, *remarks),
         )
+
+
+def _codes(file: RecordFile, source: str) -> tuple[str, ...]:
+    """Return the codes of network, station, location and channel of a source identifier."""
+    codes = _SOURCE.fullmatch(source)
+    if codes is None:
+        raise file.error(f"the source {source!r} is not a channel: request the record again")
+    network, station, location, *channel = codes.groups()
+    return network, station, location, "".join(channel)
 
 
 def _whole_records(file: RecordFile, pymseed: Any, raw: bytes) -> tuple[bytes, str]:
@@ -80,18 +129,9 @@ def _whole_records(file: RecordFile, pymseed: Any, raw: bytes) -> tuple[bytes, s
 
 
 def _channel(
-    file: RecordFile, index: int, source: str, segments: list[Any], start: str
+    file: RecordFile, codes: tuple[str, ...], segments: list[Any], gain: float, start: str
 ) -> ParsedTrace:
-    codes = _SOURCE.fullmatch(source)
-    if codes is None:
-        raise file.error(f"the source {source!r} is not a channel: request the record again")
-    network, station, location, *channel = codes.groups()
-    name = "".join(channel)
-    if channel[1] not in ACCELEROMETERS:
-        raise file.error(
-            f"{name} is not an accelerometer channel (code {channel[1]}): request the channels HN "
-            "or EN of the station"
-        )
+    network, station, location, name = codes
     if len(segments) > 1:
         gap = f"ends at {segments[0].endtime_str()} and goes on at {segments[1].starttime_str()}"
         raise file.error(f"{name} has {len(segments)} segments: it {gap}; request it without gaps")
@@ -106,7 +146,7 @@ def _channel(
         HeaderField("m/s2", 1),
         None,
         name,
-        1.0 / _gain(file, index, name),
+        1.0 / gain,
         station=f"{network}.{station}",
         recording=f"{network}.{station}.{location} {start}",
         start=segment.starttime_str(),
@@ -116,18 +156,6 @@ def _channel(
             "is no baseline correction",
         ),
     )
-
-
-def _gain(file: RecordFile, index: int, name: str) -> float:
-    gain = file.gain.get(index) if isinstance(file.gain, Mapping) else file.gain
-    if gain is None:
-        raise UnitNotStatedError(
-            file.path,
-            f"{name} is in counts without a gain: give gain in counts/(m/s2), the sensitivity in "
-            "the StationXML of the station",
-            fields=("gain",),
-        )
-    return gain
 
 
 def _damaged(file: RecordFile, trouble: object) -> Exception:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 
-from rbfrag.motions.text.record_file import NamedFields, ParsedTrace, PeakField, RecordFile
+from rbfrag.motions.record_file import NamedFields, ParsedTrace, PeakField, RecordFile
 
 FORMAT = "AFAD NSMN text"
 

@@ -16,7 +16,7 @@ from collections.abc import Iterator
 
 from rbfrag.errors import InputError
 from rbfrag.motions.ground_motion import GroundMotion
-from rbfrag.motions.text.record_file import HeaderField, ParsedTrace, RecordFile
+from rbfrag.motions.record_file import HeaderField, ParsedTrace, RecordFile
 
 FORMAT = "PEER AT2"
 

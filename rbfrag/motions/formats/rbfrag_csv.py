@@ -26,14 +26,14 @@ from typing import Any
 
 from rbfrag.errors import InputError
 from rbfrag.motions.ground_motion import GroundMotion
-from rbfrag.motions.text.record_file import (
+from rbfrag.motions.record_file import (
     Count,
     HeaderField,
     ParsedTrace,
     PrintedTimes,
     RecordFile,
 )
-from rbfrag.motions.text.times import FIRST_YEAR
+from rbfrag.motions.text import FIRST_YEAR
 
 FORMAT = "rbfrag CSV"
 

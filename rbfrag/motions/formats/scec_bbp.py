@@ -16,8 +16,8 @@ from collections.abc import Iterator
 from itertools import takewhile
 
 from rbfrag.errors import InputError
-from rbfrag.motions.text.record_file import HeaderField, ParsedTrace, RecordFile
-from rbfrag.motions.text.times import sampling_interval
+from rbfrag.motions.record_file import HeaderField, ParsedTrace, RecordFile
+from rbfrag.motions.text import sampling_interval
 from rbfrag.motions.units import stated_in_g
 
 FORMAT = "SCEC broadband platform"

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from rbfrag.motions.text.record_file import Count, ParsedTrace, RecordFile
+from rbfrag.motions.record_file import Count, ParsedTrace, RecordFile
 
 FORMAT = "SimCenter event JSON"
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 
-from rbfrag.motions.text.record_file import HeaderField, ParsedTrace, RecordFile
+from rbfrag.motions.record_file import HeaderField, ParsedTrace, RecordFile
 
 FORMAT = "GeoNet text (.000/.090/.ver)"
 

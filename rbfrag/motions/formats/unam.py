@@ -10,14 +10,14 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 
-from rbfrag.motions.text.file import field_layout
-from rbfrag.motions.text.record_file import (
+from rbfrag.motions.record_file import (
     HeaderField,
     NamedFields,
     ParsedTrace,
     PeakField,
     RecordFile,
 )
+from rbfrag.motions.text import field_layout
 
 FORMAT = "UNAM standard file"
 
@@ -60,7 +60,12 @@ def parse(file: RecordFile) -> Iterator[ParsedTrace]:
         raise file.error(
             f"the format {layout.text!r} does not fit {channels} channels", layout.line
         )
-    rows = file.data(first)
+    rows = list(file.data(first))
+    remarks: tuple[str, ...] = ()
+    # some stations' files lack the leading blank of the first row, all of whose fields are apart
+    if rows and len(rows[0]) == per_line * width - 1 and len(rows[0].split()) == per_line:
+        rows[0] = f" {rows[0]}"
+        remarks = ("the first row of samples lacks its leading blank",)
     table = file.fixed_table(rows, first + 1, (per_line, width), "acceleration")
     station = fields["CLAVE DE LA ESTACION"].text
     event = f"{fields.text('FECHA DEL SISMO')} {fields.text('HORA EPICENTRO')}".strip()
@@ -76,6 +81,7 @@ def parse(file: RecordFile) -> Iterator[ParsedTrace]:
             # rumbo;orientacion: the azimuth, then the axis of the instrument
             axis=component.split(";")[0].strip(),
             is_corrected=False,
+            remarks=remarks,
             durations=(duration,),
             peak=PeakField(peaks[at], "gal", largest.line) if len(peaks) == channels else None,
         )

@@ -10,8 +10,8 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 
-from rbfrag.motions.text.file import MOST_DIGITS, holds_integers
-from rbfrag.motions.text.record_file import HeaderField, ParsedTrace, RecordFile, peak_of
+from rbfrag.motions.record_file import HeaderField, ParsedTrace, RecordFile, peak_of
+from rbfrag.motions.text import MOST_DIGITS, holds_integers
 
 FORMAT = "USGS SMC"
 

@@ -84,32 +84,27 @@ def read_block(path: str | os.PathLike[str], *, gamma_deg: float | None = None) 
         raise InputError(
             f"{source}: back_fracture = {conditions['back_fracture']!r}: use true or false"
         )
-    try:
-        block = _block(fields)
-    except InputError as error:
-        raise InputError(f"{source}: {error}") from None
-    return BlockFile(os.fspath(path), block, conditions)
-
-
-def _block(fields: dict[str, Any]) -> Block:
-    keys = set(fields)
     for names, make in (
         (POLYGON, Block.from_polygon),
         (ANGLES, Block.from_angles),
         (FRACTURES, Block.from_fractures),
     ):
-        if keys == set(names):
-            return make(**fields)
+        if set(fields) == set(names):
+            try:
+                return BlockFile(os.fspath(path), make(**fields), conditions)
+            except InputError as error:
+                raise InputError(f"{source}: {error}") from None
     accepted = {*POLYGON, *ANGLES, *FRACTURES}
-    unknown = sorted(keys - accepted)
-    if unknown:
+    if unknown := sorted(set(fields) - accepted):
         raise InputError(
-            f"unknown key {unknown[0]!r}: the keys of a block file are "
+            f"{source}: unknown key {unknown[0]!r}: the keys of a block file are "
             f"{', '.join(sorted(accepted))}, {', '.join(CONDITIONS)}"
         )
     forms = " or ".join(", ".join(names) for names in (ANGLES, FRACTURES, POLYGON))
-    key_list = ", ".join(sorted(keys)) or "none of them"
-    raise InputError(f"a block is given by exactly one of {forms}; the file has {key_list}")
+    key_list = ", ".join(sorted(fields)) or "none of them"
+    raise InputError(
+        f"{source}: a block is given by exactly one of {forms}; the file has {key_list}"
+    )
 
 
 def _from_csv(source: Path, text: str) -> dict[str, Any]:
@@ -122,15 +117,26 @@ def _from_csv(source: Path, text: str) -> dict[str, Any]:
             continue
         if row[0].startswith("#"):
             _comment(fields, ",".join(cells).strip()[1:], where)
-        elif header is None:
+            continue
+        if header is None:
             header = row
             if header != ["x_m", "y_m", "contact"]:
                 raise InputError(
                     f"{where}: the columns are {','.join(row)}, but an outline has "
                     "x_m,y_m,contact (contact empty for other vertices)"
                 )
-        else:
-            _vertex(fields, row, where)
+            continue
+        if len(row) not in (2, 3):
+            raise InputError(f"{where}: {len(row)} cells instead of x_m,y_m,contact")
+        if contact := row[2].lower() if len(row) == 3 else "":
+            if contact not in _CONTACTS:
+                raise InputError(
+                    f"{where}: unknown contact {row[2]!r}: use heel, back, toe or nothing"
+                )
+            if contact in fields:
+                raise InputError(f"{where}: a second {contact}: each contact is one vertex")
+            fields[contact] = len(fields["vertices_m"])
+        fields["vertices_m"].append((_number(row[0], "x_m", where), _number(row[1], "y_m", where)))
     if header is None:
         raise InputError(f"{source}: no outline: the header must be x_m,y_m,contact")
     missing = [name for name in _CONTACTS if name not in fields]
@@ -157,20 +163,6 @@ def _comment(fields: dict[str, Any], text: str, where: str) -> None:
         fields[key] = truth.get(value.strip().lower(), value.strip())
     else:
         fields[key] = _number(value, key, where)
-
-
-def _vertex(fields: dict[str, Any], row: list[str], where: str) -> None:
-    if len(row) not in (2, 3):
-        raise InputError(f"{where}: {len(row)} cells instead of x_m,y_m,contact")
-    vertices = fields["vertices_m"]
-    if len(row) == 3 and row[2]:
-        contact = row[2].lower()
-        if contact not in _CONTACTS:
-            raise InputError(f"{where}: unknown contact {row[2]!r}: use heel, back, toe or nothing")
-        if contact in fields:
-            raise InputError(f"{where}: a second {contact}: each contact is one vertex")
-        fields[contact] = len(vertices)
-    vertices.append((_number(row[0], "x_m", where), _number(row[1], "y_m", where)))
 
 
 def _number(text: str, name: str, where: str) -> float:

@@ -41,11 +41,11 @@ class Elementwise(Generic[N]):
     log10: Callable[[N], N]
 
 
-def _choose(condition: bool, yes: float, no: float) -> float:
-    return yes if condition else no
-
-
-SCALAR: Elementwise[float] = Elementwise(sqrt=math.sqrt, where=_choose, log10=math.log10)
+SCALAR: Elementwise[float] = Elementwise(
+    sqrt=math.sqrt,
+    where=lambda condition, yes, no: yes if condition else no,
+    log10=math.log10,
+)
 """The functions for single numbers."""
 
 

@@ -236,9 +236,20 @@ class MeshBlock(Result):
 
         Numbers are None where the centre of mass lies outside the contacts.
         """
-        return [_spread(hull) for hull in self.hulls]
+        rows = []
+        for hull in self.hulls:
+            row: dict[str, Any] = {"contact_mm": hull.contact_mm, "contacts": len(hull.points_m)}
+            extremes: Sequence[Any] = (None,) * 5
+            if hull.stands:
+                rocking, weakest = hull.rocking(LINES_DEG), hull.weakest()
+                kr, p2 = rocking.kr, np.append(rocking.p2, weakest.p2)
+                values = weakest.kr, np.median(kr), kr.max(), p2.min(), p2.max()
+                extremes = [float(value) for value in values]
+            names = ("kr_least", "kr_median", "kr_greatest", "p2_least", "p2_greatest")
+            rows.append({**row, **dict(zip(names, extremes, strict=True))})
+        return rows
 
-    def columns(self) -> dict[str, NDArray[Any]]:
+    def table_columns(self) -> dict[str, NDArray[Any]]:
         """Return a table of blocks, one row for each of :data:`LINES_DEG`.
 
         ``p2_1_s2``, ``kr`` and ``restitution`` are those of the weaker sense.
@@ -258,10 +269,6 @@ class MeshBlock(Result):
             "restitution_forward": rocking.restitution_forward,
             "restitution_backward": rocking.restitution_backward,
         }
-
-    def table_columns(self) -> dict[str, NDArray[Any]]:
-        """Return the columns of :meth:`columns`."""
-        return self.columns()
 
     def sentences(self) -> Iterator[str]:
         """Yield the uplift acceleration of the weakest azimuth."""
@@ -297,7 +304,7 @@ class MeshBlock(Result):
     def as_dict(self) -> dict[str, Any]:
         """Return the answer of `rbfrag block --mesh --json`; k_r and p² of the weakest azimuth."""
         weakest = self.hull.weakest()
-        columns = {name: column.tolist() for name, column in self.columns().items()}
+        columns = {name: column.tolist() for name, column in self.table_columns().items()}
         return {
             "name": self.name,
             "volume_m3": self.volume_m3,
@@ -320,36 +327,26 @@ class MeshBlock(Result):
         }
 
 
-class MassProperties(NamedTuple):
-    """Mass properties of the body inside a closed surface.
-
-    Args:
-        volume_m3: volume [m³].
-        centre_m: centre of mass, shape (3,) [m].
-        inertia_m2: inertia tensor about it per mass, shape (3, 3) [m²].
-    """
-
-    volume_m3: float
-    centre_m: Array
-    inertia_m2: Array
-
-
 def mesh_block(
     name: str,
     vertices_m: Array,
-    mass: MassProperties,
     *,
+    volume_m3: float,
+    centre_m: Array,
+    inertia_m2: Array,
     up: str = "z",
     contact_mm: float = CONTACT_MM,
     density_kg_m3: float | None = None,
     warnings: Sequence[str] = (),
 ) -> MeshBlock:
-    """Return the block defined by the vertices of a closed surface and its mass.
+    """Return the block defined by the vertices of a closed surface and what it encloses.
 
     Args:
         name: what messages and rows of tables call it.
         vertices_m: vertices in the measured resting pose, shape (n, 3) [m].
-        mass: volume, centre and inertia in the same axes.
+        volume_m3: volume inside the surface [m³].
+        centre_m: its centre of mass, shape (3,) [m].
+        inertia_m2: inertia tensor about it per mass in the same axes, shape (3, 3) [m²].
         up: the axis that points up.
         contact_mm: height above the lowest vertex up to which vertices are contacts [mm].
         density_kg_m3: density [kg/m³]; only the mass needs it.
@@ -365,34 +362,38 @@ def mesh_block(
     if density_kg_m3 is not None:
         density_kg_m3 = positive(density_kg_m3, "density_kg_m3", "kg/m³")
     axes = list(PLAN_AXES[up])
-    positions = (vertices_m - mass.centre_m)[:, axes]
-    inertia = mass.inertia_m2[np.ix_(axes, axes)]
-    hulls = {
-        height: _contact_hull(positions, inertia, height)
-        for height in sorted({contact_mm, *OTHER_CONTACTS_MM})
-    }
+    positions = (vertices_m - centre_m)[:, axes]
+    inertia = inertia_m2[np.ix_(axes, axes)]
+    lowest = positions[:, 2].min()
+    hulls = {}
+    for height in sorted({contact_mm, *OTHER_CONTACTS_MM}):
+        points = positions[positions[:, 2] <= lowest + 1e-3 * height, :2]
+        hulls[height] = ContactHull(height, points, _convex(points), -float(lowest), inertia)
     hull = hulls[contact_mm]
     if not hull.stands:
-        raise InputError(_not_at_rest(name, hull, tuple(hulls.values())))
+        azimuth, distance = hull.nearest_edge()
+        rests = [f"{height:g}" for height, other in hulls.items() if other.stands]
+        within = f" (it stands within {', '.join(rests)} mm)" if rests else ""
+        raise InputError(
+            f"{name}: not its resting pose: the centre of mass lies {-distance:.3g} m outside its "
+            f"contacts (vertices within {contact_mm:g} mm of the lowest: {len(hull.points_m)}), "
+            f"towards azimuth {azimuth % 360.0:.0f} deg. Turn the mesh into the pose measured on "
+            "level ground, name the axis that points up, or raise the height of "
+            f"contact{within}"
+        )
     extent_m = float(np.ptp(vertices_m, axis=0).max())
     return MeshBlock(
         name=name,
         up=up,
-        volume_m3=mass.volume_m3,
+        volume_m3=volume_m3,
         density_kg_m3=density_kg_m3,
-        centre_m=mass.centre_m,
-        inertia_m2=mass.inertia_m2,
+        centre_m=centre_m,
+        inertia_m2=inertia_m2,
         hull=hull,
         hulls=tuple(hulls.values()),
         outline_m=_convex(positions[:, :2]),
         warnings=(*warnings, *_doubts(extent_m, hull, tuple(hulls.values()))),
     )
-
-
-def _contact_hull(positions: Array, inertia: Array, contact_mm: float) -> ContactHull:
-    lowest = positions[:, 2].min()
-    points = positions[positions[:, 2] <= lowest + 1e-3 * contact_mm, :2]
-    return ContactHull(contact_mm, points, _convex(points), -float(lowest), inertia)
 
 
 def _convex(points: Array) -> Array:
@@ -405,32 +406,6 @@ def _convex(points: Array) -> Array:
         return points[ConvexHull(points).vertices]
     except QhullError:  # all on one line
         return np.empty((0, 2))
-
-
-def _spread(hull: ContactHull) -> dict[str, Any]:
-    names = ("kr_least", "kr_median", "kr_greatest", "p2_least", "p2_greatest")
-    values: tuple[float | None, ...] = (None,) * len(names)
-    if hull.stands:
-        rocking = hull.rocking(LINES_DEG)
-        weakest = hull.weakest()
-        kr, p2 = rocking.kr, np.append(rocking.p2, weakest.p2)
-        extremes = weakest.kr, np.median(kr), kr.max(), p2.min(), p2.max()
-        values = tuple(float(value) for value in extremes)
-    row = dict(zip(names, values, strict=True))
-    return {"contact_mm": hull.contact_mm, "contacts": len(hull.points_m), **row}
-
-
-def _not_at_rest(name: str, hull: ContactHull, alternatives: tuple[ContactHull, ...]) -> str:
-    azimuth, distance = hull.nearest_edge()
-    rests = [f"{other.contact_mm:g}" for other in alternatives if other.stands]
-    within = f" (it stands within {', '.join(rests)} mm)" if rests else ""
-    return (
-        f"{name}: not its resting pose: the centre of mass lies {-distance:.3g} m outside its "
-        f"contacts (vertices within {hull.contact_mm:g} mm of the lowest: "
-        f"{len(hull.points_m)}), towards azimuth {azimuth % 360.0:.0f} deg. Turn the mesh into "
-        "the pose measured on level ground, name the axis that points up, or raise the height of "
-        f"contact{within}"
-    )
 
 
 def _doubts(extent_m: float, hull: ContactHull, hulls: tuple[ContactHull, ...]) -> list[Diagnostic]:

@@ -168,9 +168,17 @@ def section_of(face: Plane, base: Plane, back: Plane | None = None) -> Section:
             )
             remarks.append(Diagnostic(text, "cross_tilt_neglected"))
             continue
+        wedge = ""
+        if line is not None:
+            plunge, trend = line
+            daylights = " and daylights" if 0.0 < plunge < face.trace_deg(trend) else ""
+            wedge = (
+                f": base and back make a wedge, whose line plunges {plunge:.1f} deg toward "
+                f"{trend:03.0f}{daylights}; analyse it as a wedge"
+            )
         raise InputError(
             f"the {name} {plane} strikes {off:.0f} deg off the face {face}, more than the "
-            f"{STRIKE_DEG:g} deg allowed for a section{_wedge(line, face)}",
+            f"{STRIKE_DEG:g} deg allowed for a section{wedge}",
             fields=(name, "face"),
         )
     beta = base.trace_deg(azimuth)
@@ -207,16 +215,4 @@ def section_of(face: Plane, base: Plane, back: Plane | None = None) -> Section:
         remarks.append(Diagnostic(text, "oblique_planes"))
     return Section(
         beta, gamma, base.spacing_factor(azimuth), back.spacing_factor(azimuth), tuple(remarks)
-    )
-
-
-def _wedge(line: tuple[float, float] | None, face: Plane) -> str:
-    """Return a sentence on the line of intersection of base and back."""
-    if line is None:
-        return ""
-    plunge, trend = line
-    daylights = 0.0 < plunge < face.trace_deg(trend)
-    return (
-        f": base and back make a wedge, whose line plunges {plunge:.1f} deg toward "
-        f"{trend:03.0f}{' and daylights' if daylights else ''}; analyse it as a wedge"
     )

@@ -28,7 +28,7 @@ _BARE: dict[str, Any] = {"_nrt": False}
 def kernel(function: Callable[P, R]) -> Callable[P, R]:
     """Compile a function over arrays to machine code.
 
-    The machine code is kept beside the package, or in the user's cache folder when the
+    The machine code is kept next to the package, or in the user's cache folder when the
     package is installed read-only. numba writes cache files under a temporary name and
     renames them, so several workers may start at once. Where neither folder can be
     written, a folder of the user's own below the temporary one is taken (:func:`last_resort`).
@@ -168,13 +168,8 @@ class _CacheFile(IndexDataCacheFile):
 def _stamp_of_sources() -> tuple[tuple[str, int, int], ...]:
     """Return name, time and size of every source file of the solver."""
     solver = Path(__file__).parents[1]
-    files = sorted(solver.rglob("*.py"))
-    return tuple((str(f.relative_to(solver)), *_time_and_size(f)) for f in files)
-
-
-def _time_and_size(file: Path) -> tuple[int, int]:
-    cached = file.stat()
-    return cached.st_mtime_ns, cached.st_size
+    files = ((file, file.stat()) for file in sorted(solver.rglob("*.py")))
+    return tuple((str(f.relative_to(solver)), at.st_mtime_ns, at.st_size) for f, at in files)
 
 
 def _stamped_with_all_sources(compiled: Any) -> None:
@@ -192,7 +187,7 @@ def _stamped_with_all_sources(compiled: Any) -> None:
 def _once_for_literals(compiled: Any) -> None:
     """Make calls with different literals share one compilation of a kernel.
 
-    numba compiles a callee anew for each literal that stands in a call (0, 1, True), which
+    numba compiles a callee again for each literal that stands in a call (0, 1, True), which
     doubled the time of the first search on a machine.
     """
     template = getattr(compiled, "get_call_template", None)

@@ -10,15 +10,9 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from rbfrag.solver.integrator.block_excitation import BlockExcitation
+from rbfrag.solver.integrator.block_excitation import BlockExcitation, span_step
 from rbfrag.solver.integrator.compiled import inner_kernel, within
-from rbfrag.solver.integrator.events import (
-    eventful,
-    examine_step,
-    irrecoverable,
-    upright_rate,
-)
-from rbfrag.solver.integrator.spans import span_step
+from rbfrag.solver.integrator.events import eventful, examine_step, irrecoverable, upright_rate
 from rbfrag.solver.integrator.state import Place, State, StepExcitation, at_rest, excitation_over
 from rbfrag.solver.integrator.taylor import ORDER, even_parts, lean_step, turn, value
 from rbfrag.solver.results import FloatArray
@@ -221,7 +215,7 @@ def integrate_excursion(
             shaking = excitation_over(k_h, w, i, at, part)
             steps += 1
             if ph != ph_now:
-                # as long as steps have one length, U goes on without being rounded anew
+                # as long as steps have one length, U goes on without being rounded again
                 ph_now = ph
                 per_ph = 1.0 / ph
                 u_now = ph * rate

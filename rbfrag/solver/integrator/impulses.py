@@ -249,7 +249,7 @@ def _of_two(
 
     Where friction at both is about to stop the block between its planes, sweeps come ever closer to
     what the corners do, ever more slowly, and name it wrongly until then. That both stick is not
-    tried: four impulses that bring three speeds to nought lie on a straight line, and Coulomb's law
+    tried: four impulses that bring three speeds to zero lie on a straight line, and Coulomb's law
     holds on a part of it, at whose ends one corner's friction is at its limit.
 
     Returns:

@@ -17,13 +17,14 @@ from typing import NamedTuple
 from rbfrag.solver.excitation import BLOCK, Nodes
 from rbfrag.solver.integrator.compiled import bare_kernel, inner_kernel, within
 from rbfrag.solver.integrator.events import (
+    Thresholds,
+    depart,
     eventful,
     examine_step,
     irrecoverable,
     left_at_turn,
     upright_rate,
 )
-from rbfrag.solver.integrator.rest import Thresholds, depart
 from rbfrag.solver.integrator.state import (
     EVENT,
     Corner,
@@ -36,14 +37,15 @@ from rbfrag.solver.integrator.state import (
     kernel_corner,
     time_of_jump,
 )
-from rbfrag.solver.integrator.step import (
+from rbfrag.solver.integrator.taylor import (
     StepRules,
     drift_of_step,
+    even_parts,
     exponential_bound,
     state_after,
     take_step,
+    value,
 )
-from rbfrag.solver.integrator.taylor import even_parts, value
 from rbfrag.solver.results import FloatArray
 
 STABLE, TOPPLED, UNDETERMINED, JUMP = 0, 1, 2, 3
@@ -110,7 +112,7 @@ class Progress(NamedTuple):
 
 
 @within
-def standing(corner: Corner) -> State:
+def state_at_rest(corner: Corner) -> State:
     """Return the state of rest, where psi is the critical angle."""
     return State(0.0, 0.0, corner.sin, corner.cos)
 
@@ -119,7 +121,9 @@ def standing(corner: Corner) -> State:
 def beginning(corner: Corner) -> Progress:
     """Return the progress of a run at the beginning of its record."""
     bounds = TrajectoryBounds(0.0, 0.0, Peak(0.0, 0.0))
-    return Progress(0, False, standing(corner), bounds, math.nan, False, 0, 0, math.nan, 0.0, 0)
+    return Progress(
+        0, False, state_at_rest(corner), bounds, math.nan, False, 0, 0, math.nan, 0.0, 0
+    )
 
 
 @inner_kernel
@@ -236,7 +240,7 @@ def cross_interval(
                 g1 = nodes.k_h[i + 1] - nodes.w[i + 1] * corner.kr
                 error += math.sqrt(2.0 * max(g0, g1, 0.0) * corner.cos * drift)
         if impact_at >= 0.0:
-            break  # the rest of the interval begins anew, from rest
+            break  # the rest of the interval begins again, from rest
         state = state_after(state, step, ph)
         # in a long interval the block could swing right round before its end
         if (
@@ -376,7 +380,7 @@ def advance(
             if i >= last:
                 break
             moving, lifting, barred = True, start.smooth, 0
-            state = standing(corner)
+            state = state_at_rest(corner)
             lifted_s = time_s[i] + tau * interval_s[i]
             if math.isnan(started_s):
                 started_s = lifted_s

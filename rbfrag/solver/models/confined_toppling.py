@@ -1,9 +1,10 @@
 """Confined toppling under an overhanging back plane: the toe slides out, the heel slides up that
 plane.
 
-The equation of two sliding contacts (`rbfrag.solver.integrator.one_freedom.two_contacts`) holds up
-to the first standstill, or until the base edge stands at right angles to the back plane, where the
-toe stops and free toppling follows. At a standstill the back plane holds the block only while
+The equation of two sliding contacts (`rbfrag.solver.integrator.one_freedom.contact_equations`)
+holds up to the first standstill, or until the base edge stands at right angles to the back plane,
+where the toe stops and free toppling follows. At a standstill the back plane holds the block only
+while
 
     k_h > (1 + k_v) tan(α3 - θ - β);
 
@@ -19,113 +20,26 @@ from collections.abc import Callable
 
 from rbfrag.errors import InputError
 from rbfrag.solver.block.geometry import Block
+from rbfrag.solver.integrator.one_freedom.contact_equations import (
+    Contact,
+    rocking_equation,
+    two_contact_equation,
+)
 from rbfrag.solver.integrator.one_freedom.equation import (
     Ending,
     Equation,
     Exit,
+    Harmonics,
     Mechanism,
     Phase,
     Pose,
+    Vector,
+    constant,
+    turning,
 )
-from rbfrag.solver.integrator.one_freedom.harmonics import Harmonics, Vector, constant, turning
-from rbfrag.solver.integrator.one_freedom.rocking import rocking_equation
-from rbfrag.solver.integrator.one_freedom.two_contacts import Contact, two_contact_equation
 from rbfrag.solver.kind import SupportedBlock
 from rbfrag.solver.results import Outcome
 from rbfrag.solver.search.incremental_scaling import ScaledKind
-
-
-def mechanism(supported_block: SupportedBlock) -> Mechanism:
-    """Return the confined block."""
-    block = supported_block.block
-    assert block is not None
-    if not supported_block.back_fracture or not block.confines:
-        raise InputError("without an overhanging plane the block topples freely: use kind toppling")
-    rocking = rocking_equation(
-        block, supported_block.beta_rad, supported_block.phi_rad, supported_block.push
-    )
-    # where the base edge is normal to the back plane, and where the front face lies on the base
-    square, flat = free_from(block), block.on_front_face_rad
-    slip = toe_slip(block)
-    start = (block.base_m, 0.0)
-
-    def pose_with(slipped: Harmonics) -> Callable[[float], Pose]:
-        def pose(theta: float) -> Pose:
-            # the centroid from the toe, which stays on the base
-            arm = turning(block.toe, -1)
-            out = slipped(theta)
-            return Pose(-theta, (start[0] + out - arm.x(theta), -arm.y(theta)), out)
-
-        return pose
-
-    def after_confined(exit: Exit) -> Phase | Ending:
-        # after a standstill, where k_h < (1 + k_v) tan(α3 - θ - β): the heel leaves its plane
-        if exit.reason == "reverse":
-            return rocks_back(exit)
-        if flat <= square:
-            return _fallen(exit)
-        # here the toe has no speed: it stays, and is taken to hold (eq. 4.13 about it)
-        stays = constant(slip(square))
-        return Phase(
-            name="topples freely about its toe",
-            forward=rocking_equation(block, supported_block.beta_rad, push=supported_block.push),
-            pose=pose_with(stays),
-            after=after_free,
-            # no contact slips: no friction holds the block at a standstill
-            sticks=False,
-            impact="leaves",
-            lowest=square,
-            highest=flat,
-        )
-
-    def after_free(exit: Exit) -> Ending:
-        if exit.reason == "upper":
-            return _fallen(exit)
-        return Ending(
-            Outcome.CONTACT_LOST,
-            f"at {exit.time_s:.3f} s the heel comes back against its plane after a stretch of free "
-            "toppling",
-        )
-
-    def rocks_back(exit: Exit) -> Phase:
-        def after_rocking(exit: Exit) -> Ending:
-            if exit.reason == "upper":
-                return Ending(
-                    Outcome.CONTACT_LOST, f"at {exit.time_s:.3f} s the heel meets its plane again"
-                )
-            return Ending(
-                Outcome.CONTACT_LOST, f"at {exit.time_s:.3f} s the block falls back on its base"
-            )
-
-        return Phase(
-            name="rocks back about its toe, the heel off its plane",
-            forward=rocking,
-            pose=pose_with(constant(slip(exit.x))),
-            after=after_rocking,
-            sticks=False,
-            impact="leaves",
-            lowest=0.0,
-            highest=exit.x,
-        )
-
-    confined = equation(supported_block)
-    critical_rad = math.radians(block.alpha3_deg) - supported_block.beta_rad
-    return Mechanism(
-        first=Phase(
-            name="topples against its back plane",
-            forward=confined,
-            # not followed in this phase: its onset ends it
-            reverse=rocking,
-            leaves_in_reverse=True,
-            pose=pose_with(slip),
-            after=after_confined,
-            highest=min(square, flat),
-        ),
-        rotates=True,
-        critical=critical_rad if critical_rad > 0.0 else None,
-        goes_on=True,
-        at_toe=True,
-    )
 
 
 def equation(supported_block: SupportedBlock) -> Equation:
@@ -188,8 +102,94 @@ class ConfinedToppling(ScaledKind):
     yield_name = "kct"
 
     def mechanism(self, supported_block: SupportedBlock) -> Mechanism:
-        """Return the confined toppling block."""
-        return mechanism(supported_block)
+        """Return the confined block."""
+        block = supported_block.block
+        assert block is not None
+        if not supported_block.back_fracture or not block.confines:
+            raise InputError(
+                "without an overhanging plane the block topples freely: use kind toppling"
+            )
+        beta_rad, push = supported_block.beta_rad, supported_block.push
+        rocking = rocking_equation(block, beta_rad, supported_block.phi_rad, push)
+        # where the base edge is normal to the back plane, and where the front face lies on the base
+        square, flat = free_from(block), block.on_front_face_rad
+        slip = toe_slip(block)
+        start = (block.base_m, 0.0)
+
+        def pose_with(slipped: Harmonics) -> Callable[[float], Pose]:
+            def pose(theta: float) -> Pose:
+                # the centroid from the toe, which stays on the base
+                arm = turning(block.toe, -1)
+                out = slipped(theta)
+                return Pose(-theta, (start[0] + out - arm.x(theta), -arm.y(theta)), out)
+
+            return pose
+
+        def after_confined(exit: Exit) -> Phase | Ending:
+            # after a standstill, where k_h < (1 + k_v) tan(α3 - θ - β): the heel leaves its plane
+            if exit.reason == "reverse":
+                return rocks_back(exit)
+            if flat <= square:
+                return _fallen(exit)
+            # here the toe has no speed: it stays, and is taken to hold (eq. 4.13 about it)
+            stays = constant(slip(square))
+            return Phase(
+                name="topples freely about its toe",
+                forward=rocking_equation(block, beta_rad, push=push),
+                pose=pose_with(stays),
+                after=after_free,
+                # no contact slips: no friction holds the block at a standstill
+                sticks=False,
+                impact="leaves",
+                lowest=square,
+                highest=flat,
+            )
+
+        def after_free(exit: Exit) -> Ending:
+            if exit.reason == "upper":
+                return _fallen(exit)
+            return Ending(
+                Outcome.CONTACT_LOST,
+                f"at {exit.time_s:.3f} s the heel comes back against its plane after a stretch of "
+                "free toppling",
+            )
+
+        def rocks_back(exit: Exit) -> Phase:
+            def after_rocking(exit: Exit) -> Ending:
+                event = "the block falls back on its base"
+                if exit.reason == "upper":
+                    event = "the heel meets its plane again"
+                return Ending(Outcome.CONTACT_LOST, f"at {exit.time_s:.3f} s {event}")
+
+            return Phase(
+                name="rocks back about its toe, the heel off its plane",
+                forward=rocking,
+                pose=pose_with(constant(slip(exit.x))),
+                after=after_rocking,
+                sticks=False,
+                impact="leaves",
+                lowest=0.0,
+                highest=exit.x,
+            )
+
+        confined = equation(supported_block)
+        critical_rad = math.radians(block.alpha3_deg) - beta_rad
+        return Mechanism(
+            first=Phase(
+                name="topples against its back plane",
+                forward=confined,
+                # not followed in this phase: its onset ends it
+                reverse=rocking,
+                leaves_in_reverse=True,
+                pose=pose_with(slip),
+                after=after_confined,
+                highest=min(square, flat),
+            ),
+            rotates=True,
+            critical=critical_rad if critical_rad > 0.0 else None,
+            goes_on=True,
+            at_toe=True,
+        )
 
 
 MODEL = ConfinedToppling.named("confined_toppling")

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from functools import lru_cache
 
 import numpy as np
 
@@ -20,28 +21,15 @@ from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.results.diagnostic import Diagnostic
 from rbfrag.results.numbers import relative
 from rbfrag.solver.block.formulas import moments_about_corners
-from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.excitation import Excitation
 from rbfrag.solver.integrator.rocking_kernel import RockingRun
 from rbfrag.solver.integrator.state import Corner, corner
-from rbfrag.solver.kind import (
-    Kind,
-    RunEnd,
-    Runner,
-    Shaking,
-    SupportedBlock,
-)
+from rbfrag.solver.kind import Kind, RunEnd, Runner, Shaking, SupportedBlock
 from rbfrag.solver.quantity import finite_or_none, number, positive
-from rbfrag.solver.results import (
-    FloatArray,
-    Outcome,
-    Response,
-    ResponseHistory,
-)
+from rbfrag.solver.results import FloatArray, Outcome, Response, ResponseHistory
 from rbfrag.solver.rocking_run import (
     MOST_IMPACTS,
     FreeBlock,
-    RockingHistory,
     corner_force,
     rocking_history,
     simulate,
@@ -83,34 +71,7 @@ def free_block(supported_block: SupportedBlock) -> FreeBlock:
             positive(supported_block.yield_g, "kr", "g"),
             restitution,
         )
-    return _of_shape(supported_block.block, supported_block.beta_rad, restitution)
-
-
-def rectangle(p2: float, kr: float, restitution: float | None) -> FreeBlock:
-    """Return the rectangle on level ground with these parameters.
-
-    Args:
-        p2: frequency parameter p² [1/s²].
-        kr: tangent of the critical angle.
-        restitution: restitution; None for that of the rectangle (Housner 1963).
-    """
-    both = corner(
-        kr, math.sqrt(p2), restitution_of_rectangle(kr) if restitution is None else restitution
-    )
-    # half of the sides: the base is level, and the centroid above its middle
-    half, height = rectangle_r3_m(p2) * both.sin, rectangle_r3_m(p2) * both.cos
-    return FreeBlock(both, both, 2.0 * half, (half, height), 0.0)
-
-
-def restitution_of_rectangle(kr: float) -> float:
-    """Return 1 - 1.5 sin² α of the rectangle with tan α = k_r (Housner 1963).
-
-    Not above 0 for a block so stocky that an impact leaves it no speed.
-    """
-    return 1.0 - 1.5 * kr * kr / (1.0 + kr * kr)
-
-
-def _of_shape(block: Block, beta_rad: float, restitution: float | None) -> FreeBlock:
+    block, beta_rad = supported_block.block, supported_block.beta_rad
     balances = (
         ("forward over its toe", "alpha3 - beta", math.radians(block.alpha3_deg) - beta_rad),
         ("backward over its heel", "beta - alpha1", beta_rad - math.radians(block.alpha1_deg)),
@@ -135,6 +96,30 @@ def _of_shape(block: Block, beta_rad: float, restitution: float | None) -> FreeB
         centroid_m=block.centroid,
         beta_rad=beta_rad,
     )
+
+
+def rectangle(p2: float, kr: float, restitution: float | None) -> FreeBlock:
+    """Return the rectangle on level ground with these parameters.
+
+    Args:
+        p2: frequency parameter p² [1/s²].
+        kr: tangent of the critical angle.
+        restitution: restitution; None for that of the rectangle (Housner 1963).
+    """
+    both = corner(
+        kr, math.sqrt(p2), restitution_of_rectangle(kr) if restitution is None else restitution
+    )
+    # half of the sides: the base is level, and the centroid above its middle
+    half, height = rectangle_r3_m(p2) * both.sin, rectangle_r3_m(p2) * both.cos
+    return FreeBlock(both, both, 2.0 * half, (half, height), 0.0)
+
+
+def restitution_of_rectangle(kr: float) -> float:
+    """Return 1 - 1.5 sin² α of the rectangle with tan α = k_r (Housner 1963).
+
+    Not above 0 for a block so stocky that an impact leaves it no speed.
+    """
+    return 1.0 - 1.5 * kr * kr / (1.0 + kr * kr)
 
 
 def _corner(
@@ -166,7 +151,7 @@ class Rocking(Kind):
             outcome = Outcome.UNDETERMINED
         # of a block that has overturned a peak is only where the run was stopped
         has_peak = outcome is Outcome.STABLE
-        senses = peaks(run, outcome)
+        ended = outcome in (Outcome.STABLE, Outcome.TOPPLED)
         ratios = (run.forward.x / block.toe.theta_c, run.backward.x / block.heel.theta_c)
         traced = rocking_history(excited, block, run.impacts)
         sensitive, spread = repeated(excited, block, run)
@@ -181,15 +166,15 @@ class Rocking(Kind):
             error_estimate=finite_or_none(error_of(run, outcome)),
             steps=run.steps,
             samples_moved=run.samples_moved,
-            samples_total=int(np.count_nonzero(excited.interval_s)),
+            samples_total=excited.samples_total,
             warnings=(
                 *shaking.warnings,
-                *_warnings(block, supported_block, run, outcome, sensitive, spread, traced.motion),
+                *_warnings(block, supported_block, run, outcome, sensitive, spread, traced),
             ),
             history=_posed(block, traced) if shaking.history else None,
             critical_backward_deg=math.degrees(block.heel.theta_c),
-            peak_forward_rad=senses[0],
-            peak_backward_rad=senses[1],
+            peak_forward_rad=run.forward.x if ended and run.side <= 0 else None,
+            peak_backward_rad=run.backward.x if ended and run.side >= 0 else None,
             impacts=run.impacts,
             sensitive=sensitive,
             peak_spread=spread if has_peak else None,
@@ -222,13 +207,6 @@ class Rocking(Kind):
         return free_block(supported_block)
 
 
-def peaks(run: RockingRun, outcome: Outcome) -> tuple[float | None, float | None]:
-    """Return the peak rotation forward and backward [rad]; None where there is none."""
-    if outcome not in (Outcome.STABLE, Outcome.TOPPLED):
-        return None, None
-    return (None if run.side > 0 else run.forward.x, None if run.side < 0 else run.backward.x)
-
-
 def error_of(run: RockingRun, outcome: Outcome) -> float:
     """Return the estimated error of the larger peak [rad], or of the final rotation if there is no
     peak.
@@ -245,9 +223,7 @@ def repeated(excited: Excitation, block: FreeBlock, run: RockingRun) -> tuple[bo
         Whether the outcome changes, and the greatest relative change of the greater peak; None for
         the latter where the outcome changes, or where the block does not move.
     """
-    repeats = [
-        simulate(excited.scaled(1.0 + change), block) for change in (SENSITIVITY, -SENSITIVITY)
-    ]
+    repeats = [simulate(scaled, block) for scaled in _scaled_slightly(excited)]
     if any(repeat.outcome != run.outcome for repeat in repeats):
         return True, None
     peak = max(run.forward.x, run.backward.x)
@@ -255,6 +231,12 @@ def repeated(excited: Excitation, block: FreeBlock, run: RockingRun) -> tuple[bo
         return False, None
     changes = [abs(max(repeat.forward.x, repeat.backward.x) - peak) for repeat in repeats]
     return False, max(changes) / peak
+
+
+@lru_cache(maxsize=8)
+def _scaled_slightly(excited: Excitation) -> tuple[Excitation, Excitation]:
+    """Return the motion times 1 + 1e-6 and 1 - 1e-6, the same objects for the last few motions."""
+    return excited.scaled(1.0 + SENSITIVITY), excited.scaled(1.0 - SENSITIVITY)
 
 
 def _warnings(
@@ -320,16 +302,16 @@ def _warnings(
     return warnings
 
 
-def _posed(block: FreeBlock, traced: RockingHistory) -> ResponseHistory:
+def _posed(block: FreeBlock, traced: ResponseHistory) -> ResponseHistory:
     """Return the history with the position of the block, rotated about its toe or heel."""
-    theta = traced.motion.theta_rad
+    theta = traced.theta_rad
     # about the toe forward, about the heel backward, both at rest on the base
     pivot = np.where(theta >= 0.0, block.toe_m, 0.0)
     arm = block.centroid_m[0] - pivot
     rise = block.centroid_m[1]
     c, s = np.cos(theta), np.sin(theta)
     centroid: FloatArray = np.stack([pivot + arm * c + rise * s, rise * c - arm * s], axis=1)
-    return replace(traced.motion, centroid_m=centroid, turned_rad=-theta, impact_s=traced.impact_s)
+    return replace(traced, centroid_m=centroid, turned_rad=-theta)
 
 
 MODEL = Rocking.named("rocking")

@@ -38,16 +38,14 @@ from rbfrag.solver.integrator.one_freedom.equation import (
     Mechanism,
     Phase,
     Pose,
+    constant,
 )
 from rbfrag.solver.integrator.one_freedom.follow import follow
-from rbfrag.solver.integrator.one_freedom.harmonics import constant
-from rbfrag.solver.kind import (
-    SupportedBlock,
-)
-from rbfrag.solver.mechanism import MechanismKind, driven_up_below
+from rbfrag.solver.kind import SupportedBlock
 from rbfrag.solver.quantity import positive
 from rbfrag.solver.results import SEARCH_LIMIT, FloatArray, Outcome, Polarity
 from rbfrag.solver.search.displacement import TOLERANCE, SlidingBlocks, critical_of
+from rbfrag.solver.simulation import MechanismKind, driven_up_below
 
 THRESHOLDS_M = (0.01, 0.05, 0.15, 0.30)
 """Displacements that are asked about when nothing else is said [m]."""
@@ -57,58 +55,6 @@ KY_OVER_PGA = (
     0.65, 0.7, 0.75, 0.8, 0.85, 0.9, 0.95,
 )  # fmt: skip
 """Strengths at which displacements are asked for when nothing else is said."""
-
-
-def mechanism(supported_block: SupportedBlock) -> Mechanism:
-    """Return the sliding block.
-
-    Args:
-        supported_block: the block, its planes, and the settings `two_way` and `horizontal`.
-    """
-    phi, beta = supported_block.phi_rad, supported_block.beta_rad
-    two_way = bool(supported_block.settings.get("two_way", False))
-    if two_way and not phi + beta < 0.5 * math.pi:
-        raise InputError(
-            f"phi + beta = {math.degrees(phi + beta):g} degrees: no acceleration slides the block "
-            "up the base; omit two_way"
-        )
-    forward = _equation(supported_block, 1.0)
-    start = supported_block.centroid_m
-    # both settings are forms of Newmark's block, which has no rotation
-    newmark = two_way or bool(supported_block.settings.get("horizontal", False))
-    may_tip = _may_tip(supported_block)
-    tips = may_tip and not newmark
-
-    def pose(s: float) -> Pose:
-        return Pose(0.0, (start[0] + s, start[1]), s)
-
-    def after(exit: Exit) -> Ending:
-        return Ending(Outcome.CONTACT_LOST, f"at {exit.time_s:.3f} s the block tips back")
-
-    reverse = _tips_back(supported_block) if tips else None
-    if two_way:
-        reverse = _equation(supported_block, -1.0)
-
-    return Mechanism(
-        first=Phase(
-            name="slides",
-            forward=forward,
-            reverse=reverse,
-            leaves_in_reverse=tips,
-            pose=pose,
-            after=after,
-            # with a plane behind it the block cannot go further up than it was
-            lowest=0.0 if supported_block.back_fracture else -math.inf,
-        ),
-        rotates=False,
-        critical=None,
-        warnings=(KY_ALONE,) if supported_block.block is None and not newmark else (),
-        least_q=_neglected_below(supported_block, two_way=two_way, tips=tips, may_tip=may_tip),
-        if_below=MAY_TIP if may_tip else MAY_SLIDE_UP,
-        stepwise_below=-math.inf if newmark else driven_up_below(supported_block),
-        goes_on=supported_block.block is not None
-        and not supported_block.settings.get("horizontal", False),
-    )
 
 
 KY_ALONE = (
@@ -126,36 +72,6 @@ MAY_SLIDE_UP = (
     "pulses into the slope slide the block up its base, which is neglected (conservative): "
     "two_way follows it"
 )
-
-
-def _neglected_below(
-    supported_block: SupportedBlock, *, two_way: bool, tips: bool, may_tip: bool
-) -> float:
-    """Return the k_h/(1 + k_v) below which an effect neglected by the model occurs."""
-    if supported_block.block is None or tips:
-        return -math.inf
-    if may_tip:
-        return tip_threshold(supported_block)
-    up = supported_block.phi_rad + supported_block.beta_rad
-    return -math.inf if two_way or up >= 0.5 * math.pi else -math.tan(up)
-
-
-def _may_tip(supported_block: SupportedBlock) -> bool:
-    """Return whether a pulse into the slope can tip the block about its heel.
-
-    With α1 <= -φ it slides up its base first; with α1 - β <= -90° the heel is not below the
-    centroid, and no pulse into the slope turns the block about it.
-    """
-    if supported_block.block is None:
-        return False
-    alpha1 = math.radians(supported_block.block.alpha1_deg)
-    return alpha1 > -supported_block.phi_rad and alpha1 - supported_block.beta_rad > -0.5 * math.pi
-
-
-def tip_threshold(supported_block: SupportedBlock) -> float:
-    """Return the k_h/(1 + k_v) below which the block tips about its heel, dry tan(α1 - β)."""
-    tips = _tips_back(supported_block)
-    return tips.threshold(0.0)
 
 
 def _tips_back(supported_block: SupportedBlock) -> Equation:
@@ -237,7 +153,7 @@ def sliding_displacements(
 
 def slide_m(excited: Excitation, ky: float) -> float:
     """Return the permanent displacement down a level plane [m]; NaN where k_v lifts it off."""
-    run = follow(mechanism(level_plane(ky)), excited)
+    run = follow(MODEL.mechanism(level_plane(ky)), excited)
     # downslope only: where it stops is the greatest displacement, too
     return run.x if run.outcome is Outcome.STABLE else math.nan
 
@@ -254,8 +170,68 @@ class Sliding(MechanismKind):
     yield_name = "ky"
 
     def mechanism(self, supported_block: SupportedBlock) -> Mechanism:
-        """Return the sliding block."""
-        return mechanism(supported_block)
+        """Return the sliding block.
+
+        Args:
+            supported_block: the block, its planes, and the settings `two_way` and `horizontal`.
+        """
+        block, phi, beta = supported_block.block, supported_block.phi_rad, supported_block.beta_rad
+        up = phi + beta
+        two_way = bool(supported_block.settings.get("two_way", False))
+        if two_way and not up < 0.5 * math.pi:
+            raise InputError(
+                f"phi + beta = {math.degrees(up):g} degrees: no acceleration slides the block up "
+                "the base; omit two_way"
+            )
+        forward = _equation(supported_block, 1.0)
+        start = supported_block.centroid_m
+        # both settings are forms of Newmark's block, which has no rotation
+        horizontal = bool(supported_block.settings.get("horizontal", False))
+        newmark = two_way or horizontal
+        # with α1 <= -φ it slides up its base first; with α1 - β <= -90° the heel is not below the
+        # centroid, and no pulse into the slope turns the block about it
+        may_tip = False
+        if block is not None:
+            alpha1 = math.radians(block.alpha1_deg)
+            may_tip = alpha1 > -phi and alpha1 - beta > -0.5 * math.pi
+        tips = may_tip and not newmark
+        # k_h/(1 + k_v) below which an effect occurs that the model neglects
+        least_q = -math.inf
+        if may_tip and not tips:
+            least_q = _tips_back(supported_block).threshold(0.0)
+        elif block is not None and not (tips or two_way or up >= 0.5 * math.pi):
+            least_q = -math.tan(up)
+
+        def pose(s: float) -> Pose:
+            return Pose(0.0, (start[0] + s, start[1]), s)
+
+        def after(exit: Exit) -> Ending:
+            return Ending(Outcome.CONTACT_LOST, f"at {exit.time_s:.3f} s the block tips back")
+
+        reverse = None
+        if tips:
+            reverse = _tips_back(supported_block)
+        elif two_way:
+            reverse = _equation(supported_block, -1.0)
+        return Mechanism(
+            first=Phase(
+                name="slides",
+                forward=forward,
+                reverse=reverse,
+                leaves_in_reverse=tips,
+                pose=pose,
+                after=after,
+                # with a plane behind it the block cannot go further up than it was
+                lowest=0.0 if supported_block.back_fracture else -math.inf,
+            ),
+            rotates=False,
+            critical=None,
+            warnings=(KY_ALONE,) if block is None and not newmark else (),
+            least_q=least_q,
+            if_below=MAY_TIP if may_tip else MAY_SLIDE_UP,
+            stepwise_below=-math.inf if newmark else driven_up_below(supported_block),
+            goes_on=block is not None and not horizontal,
+        )
 
     def critical(
         self,

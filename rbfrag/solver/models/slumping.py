@@ -3,7 +3,7 @@ the back plane.
 
 Friction is fully mobilised at both contacts, against the motion: forward (sense 1) or, when
 the ground drives the block back up, in reverse (sense -1). The equation of two sliding contacts is
-derived in `rbfrag.solver.integrator.one_freedom.two_contacts`; it has the form of toppling,
+derived in `rbfrag.solver.integrator.one_freedom.contact_equations`; it has the form of toppling,
 
     θ'' = p_s²(θ) [k_h - (1 + k_v) k_s(θ)] - q(θ) θ'²
 
@@ -23,71 +23,23 @@ import math
 
 from rbfrag.errors import InputError
 from rbfrag.solver.block.geometry import Block
+from rbfrag.solver.integrator.one_freedom.contact_equations import Contact, two_contact_equation
 from rbfrag.solver.integrator.one_freedom.equation import (
     Ending,
     Equation,
     Exit,
+    Harmonics,
     Mechanism,
     Phase,
     Pose,
+    Vector,
+    constant,
+    turning,
 )
-from rbfrag.solver.integrator.one_freedom.harmonics import Harmonics, Vector, constant, turning
-from rbfrag.solver.integrator.one_freedom.two_contacts import Contact, two_contact_equation
-from rbfrag.solver.kind import (
-    SupportedBlock,
-)
-from rbfrag.solver.mechanism import driven_up_below
+from rbfrag.solver.kind import SupportedBlock
 from rbfrag.solver.results import Outcome
 from rbfrag.solver.search.incremental_scaling import ScaledKind
-
-
-def mechanism(supported_block: SupportedBlock) -> Mechanism:
-    """Return the slumping block.
-
-    Raises:
-        InputError: there is no back plane, or the corner at the heel is missing.
-    """
-    block = supported_block.block
-    assert block is not None
-    if not supported_block.back_fracture:
-        raise InputError("a block without a back plane cannot slump")
-    if block.lowest_on_back != block.heel:
-        raise InputError(
-            "slumping in time requires a block whose heel lies on the back plane: this outline "
-            "has no corner at the heel"
-        )
-    # past recovery: the back edge lies on the base, with a forward angle α1 + γ > φ1
-    flat = block.on_back_edge_rad
-    slip = heel_slip(block)
-    path = centroid_path(block)
-
-    def pose(theta: float) -> Pose:
-        return Pose(theta, (path.x(theta), path.y(theta)), slip(theta))
-
-    def after(exit: Exit) -> Ending:
-        return Ending(
-            Outcome.TOPPLED,
-            f"at {exit.time_s:.3f} s the back edge of the block lies on the base plane: it slides "
-            "on from there, which is not followed",
-        )
-
-    forward = equation(supported_block, 1.0)
-    return Mechanism(
-        first=Phase(
-            name="slumps",
-            forward=forward,
-            reverse=equation(supported_block, -1.0),
-            pose=pose,
-            after=after,
-            highest=flat,
-        ),
-        rotates=True,
-        critical=forward.first_without_strength(flat),
-        if_impact="the block was driven back to where it had been: it is taken to stop there "
-        "without rebound, whatever its speed",
-        goes_on=True,
-        stepwise_below=driven_up_below(supported_block),
-    )
+from rbfrag.solver.simulation import driven_up_below
 
 
 def equation(supported_block: SupportedBlock, sense: float) -> Equation:
@@ -136,8 +88,52 @@ class Slumping(ScaledKind):
     yield_name = "ks"
 
     def mechanism(self, supported_block: SupportedBlock) -> Mechanism:
-        """Return the slumping block."""
-        return mechanism(supported_block)
+        """Return the slumping block.
+
+        Raises:
+            InputError: there is no back plane, or the corner at the heel is missing.
+        """
+        block = supported_block.block
+        assert block is not None
+        if not supported_block.back_fracture:
+            raise InputError("a block without a back plane cannot slump")
+        if block.lowest_on_back != block.heel:
+            raise InputError(
+                "slumping in time requires a block whose heel lies on the back plane: this outline "
+                "has no corner at the heel"
+            )
+        # past recovery: the back edge lies on the base, with a forward angle α1 + γ > φ1
+        flat = block.on_back_edge_rad
+        slip = heel_slip(block)
+        path = centroid_path(block)
+
+        def pose(theta: float) -> Pose:
+            return Pose(theta, (path.x(theta), path.y(theta)), slip(theta))
+
+        def after(exit: Exit) -> Ending:
+            return Ending(
+                Outcome.TOPPLED,
+                f"at {exit.time_s:.3f} s the back edge of the block lies on the base plane: it "
+                "slides on from there, which is not followed",
+            )
+
+        forward = equation(supported_block, 1.0)
+        return Mechanism(
+            first=Phase(
+                name="slumps",
+                forward=forward,
+                reverse=equation(supported_block, -1.0),
+                pose=pose,
+                after=after,
+                highest=flat,
+            ),
+            rotates=True,
+            critical=forward.first_without_strength(flat),
+            if_impact="the block was driven back to where it had been: it is taken to stop there "
+            "without rebound, whatever its speed",
+            goes_on=True,
+            stepwise_below=driven_up_below(supported_block),
+        )
 
 
 MODEL = Slumping.named("slumping")

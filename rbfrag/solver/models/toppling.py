@@ -15,17 +15,17 @@ from typing import Any
 
 from rbfrag.errors import InputError
 from rbfrag.motions.ground_motion import GroundMotion
-from rbfrag.solver.contacts import corner_at
 from rbfrag.solver.critical_result import CriticalResult
 from rbfrag.solver.excitation import Excitation
+from rbfrag.solver.free_motion import corner_at
+from rbfrag.solver.integrator.one_freedom.contact_equations import rocking_equation
 from rbfrag.solver.integrator.one_freedom.equation import Ending, Mechanism, Phase, Pose
-from rbfrag.solver.integrator.one_freedom.rocking import rocking_equation
 from rbfrag.solver.kind import SHAKING, Kind, RunEnd, Runner, Shaking, SupportedBlock
 from rbfrag.solver.kinds import PLANES
 from rbfrag.solver.quantity import finite_or_none
 from rbfrag.solver.results import Outcome, Response, ResponseHistory
 from rbfrag.solver.simulation import Simulation, end_of, response_of, simulate_block
-from rbfrag.solver.stability.toe_stability import (
+from rbfrag.solver.stability.validity import (
     TOE_FOLLOWED,
     slides_at_toe,
     toe_needs_in_time,
@@ -47,26 +47,25 @@ class Toppling(Kind):
             polarity=shaking.polarity,
             history=shaking.history or supported_block.block is not None,
         )
-        answer = replace(answer, warnings=(*shaking.remarks, *answer.warnings))
+        if shaking.remarks:
+            answer = answer.with_values(warnings=(*shaking.remarks, *answer.warnings))
         if supported_block.block is None or answer.history is None:
             return answer
-        beta_deg, phi_deg = (
-            math.degrees(supported_block.beta_rad),
-            math.degrees(supported_block.phi_rad),
-        )
+        angles = supported_block.beta_rad, supported_block.phi_rad
+        beta_deg, phi_deg = map(math.degrees, angles)
         slips_g = toe_slips_g(supported_block.block, beta_deg, phi_deg, supported_block.push)
-        needs = _toe_needs(supported_block, answer.history)
+        needs, is_followed = _toe_in_time(supported_block, answer.history)
         need, at_s = needs or (None, None)
         history = answer.history if shaking.history else None
-        if need is not None and _is_followed_with_toe(supported_block, needs):
+        if need is not None and is_followed:
             simulation = _with_toe(supported_block, shaking.excitation, history=shaking.history)
-            answer = replace(response_of(self.kind, simulation, shaking), state=None)
+            answer = response_of(self.kind, simulation, shaking).with_values(state=None)
             gives_way = slides_at_toe(need, f"{at_s:.2f} s", phi_deg, slips_g)
-            answer = replace(answer, warnings=(*answer.warnings, gives_way))
+            answer = answer.with_values(warnings=(*answer.warnings, gives_way))
             history = answer.history
         slips = slips_g if slips_g < math.inf else None
-        return replace(
-            answer, toe_needs_deg=need, toe_needs_s=at_s, toe_slips_g=slips, history=history
+        return answer.with_values(
+            toe_needs_deg=need, toe_needs_s=at_s, toe_slips_g=slips, history=history
         )
 
     def runner(self, supported_block: SupportedBlock) -> Runner:
@@ -78,8 +77,8 @@ class Toppling(Kind):
             end = simulate(excited, p2=p2, kr=kr)
             moved = math.isfinite(end.started_s)
             if moved and supported_block.block is not None:
-                needs = _toe_needs(supported_block, history_of(excited, p2=p2, kr=kr))
-                if _is_followed_with_toe(supported_block, needs):
+                history = history_of(excited, p2=p2, kr=kr)
+                if _toe_in_time(supported_block, history)[1]:
                     return end_of(_with_toe(supported_block, excited), self.mode, (TOE_FOLLOWED,))
             return RunEnd(
                 outcome=outcome_of(end),
@@ -107,40 +106,25 @@ class Toppling(Kind):
         return critical(motion, kind=self.kind, **options)
 
 
-def _toe_needs(
+def _toe_in_time(
     supported_block: SupportedBlock, history: ResponseHistory
-) -> tuple[float, float] | None:
-    """Return the maximum friction angle required at the toe during a rotation [deg], and its time
-    [s].
+) -> tuple[tuple[float, float] | None, bool]:
+    """Return the maximum friction angle that the toe requires [deg] with its time [s], and whether
+    the slip of the toe is followed.
+
+    That of a block of another mode, asked about as a topple, is not: it would slide or slump.
     """
-    assert supported_block.block is not None
-    return toe_needs_in_time(
-        supported_block.block, math.degrees(supported_block.beta_rad), history, supported_block.push
-    )
-
-
-def _is_followed_with_toe(
-    supported_block: SupportedBlock, needs: tuple[float, float] | None
-) -> bool:
-    """Return whether the toe of a block in toppling mode slips.
-
-    A block of another mode, asked about as a topple, is not followed: it would slide or slump.
-    """
+    block, beta_deg = supported_block.block, math.degrees(supported_block.beta_rad)
+    assert block is not None
+    needs = toe_needs_in_time(block, beta_deg, history, supported_block.push)
     slips = needs is not None and needs[0] > math.degrees(supported_block.phi_rad)
-    return slips and supported_block.yield_g is not None
+    return needs, slips and supported_block.yield_g is not None
 
 
 def _with_toe(
     supported_block: SupportedBlock, excited: Excitation, *, history: bool = False
 ) -> Simulation:
     """Follow the block with the slip of its toe, step by step."""
-    # friction on the back face is neglected, as it is in k_r
-    smooth = replace(supported_block, phi_back_rad=0.0)
-    return simulate_block(_mechanism(supported_block), smooth, excited, history=history)
-
-
-def _mechanism(supported_block: SupportedBlock) -> Mechanism:
-    """Return a block that rotates about its toe, for integration step by step from the start."""
     block = supported_block.block
     assert block is not None
     toe = block.toe
@@ -150,7 +134,7 @@ def _mechanism(supported_block: SupportedBlock) -> Mechanism:
         x, y = corner_at((block.base_m, 0.0), -theta, (-toe[0], -toe[1]))
         return Pose(-theta, (x, y), 0.0)
 
-    return Mechanism(
+    mechanism = Mechanism(
         first=Phase(
             name="topples about its toe",
             forward=rocking_equation(block, supported_block.beta_rad, push=supported_block.push),
@@ -162,6 +146,9 @@ def _mechanism(supported_block: SupportedBlock) -> Mechanism:
         stepwise_below=math.inf,
         at_toe=True,
     )
+    # friction on the back face is neglected, as it is in k_r
+    smooth = replace(supported_block, phi_back_rad=0.0)
+    return simulate_block(mechanism, smooth, excited, history=history)
 
 
 def _size(supported_block: SupportedBlock) -> float:

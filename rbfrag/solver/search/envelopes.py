@@ -33,12 +33,14 @@ from rbfrag.solver.integrator.excursion import (
 )
 from rbfrag.solver.integrator.state import Place, State, at_rest
 from rbfrag.solver.integrator.taylor import OF_RATE, ORDER, bracketed_root
-from rbfrag.solver.search.renewal import ExcursionTable, fails_after, last_rest
-from rbfrag.solver.search.rises import (
+from rbfrag.solver.search.renewal import (
     APART,
     LIFTED,
     TURNED_BACK,
+    ExcursionTable,
     common_start,
+    fails_after,
+    last_rest,
     next_start,
     restart_floor,
 )
@@ -85,7 +87,7 @@ class Impacts(NamedTuple):
         first: impact of the lower trajectory.
         last: impact of the upper one.
         in_air: the upper one has none before the record ends.
-        mixable: some blocks start anew at `first`, while others move: rule E may be tried.
+        mixable: some blocks start again at `first`, while others move: rule E may be tried.
         lower: the lower trajectory at its impact, for rule E.
         upper: the upper one at the same instant.
     """
@@ -166,7 +168,7 @@ def decide(
             pair = Pair(start.kind, start.latest, pair.upper)
             peak = start.peak
         if pair.kind == APART and impacts.mixable:
-            # E: some blocks start anew while others have not closed their contact
+            # E: some blocks start again while others have not closed their contact
             pair = mixed_pair(excitation, blocks, impacts, work)
             if pair.kind == OVERTAKEN:
                 return Decision(SPLIT, ANYWHERE)
@@ -261,18 +263,18 @@ def mixed_pair(
             # a little later, where theta' >= 0 is certain
             turned = bracketed_root(OF_RATE, state.theta, u, ORDER, 0.0, 1.0)
             turn = Place(i, min(tau + turned * remaining + 1e-13, 1.0))
-        # from above: a block that starts anew is bounded by a start at `landed`, which is no later;
-        # one still in motion by the upper trajectory, which must not end before
-        anew = integrate_excursion(
+        # from above: a block that starts again is bounded by a start at `landed`, which is not
+        # later; one still in motion by the upper trajectory, which must not end before
+        restarted = integrate_excursion(
             excitation, blocks.k_upper, landed, at_rest(blocks.k_upper), True, turn, TRUSTED
         )
         upper = integrate_excursion(
             excitation, blocks.k_upper, landed, impacts.upper.state, False, turn, NO_IMPACT
         )
-        work["steps"] += anew.steps + upper.steps
+        work["steps"] += restarted.steps + upper.steps
         # what has rotated further and faster than both bounds both
-        furthest = anew.state if anew.state.theta > upper.state.theta else upper.state
-        rate = max(upper.state.rate, anew.state.rate, 0.0)
+        furthest = restarted.state if restarted.state.theta > upper.state.theta else upper.state
+        rate = max(upper.state.rate, restarted.state.rate, 0.0)
         state = State(furthest.theta, rate, furthest.sin, furthest.cos)
         kind = LIFTED if upper.event == STOPPED else OVERTAKEN
         return Pair(kind, turn, Trajectory(upper.place, state))
@@ -371,9 +373,9 @@ def carried_on(
         return Decision(NO_ORDER, ANYWHERE), impacts
     if excursion.event == TOPPLED:
         return Decision(SPLIT, ANYWHERE), impacts
-    # C: none starts anew before q has fallen below k1
+    # C: none starts again before q has fallen below k1
     floor = restart_floor(excitation.q, blocks.k1, blocks.k2, pair.latest.interval)
-    # E can help next where some blocks start anew at once, as all do in a stretch of q > k2
+    # E can help next where some blocks start again at once, as all do in a stretch of q > k2
     after = Impacts(
         not_before(lower.place, floor),
         not_before(excursion.place, floor),

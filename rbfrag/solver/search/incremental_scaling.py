@@ -26,7 +26,6 @@ from rbfrag.results.diagnostic import Diagnostic
 from rbfrag.solver.critical_result import CriticalScale
 from rbfrag.solver.excitation import Excitation
 from rbfrag.solver.kind import Shaking
-from rbfrag.solver.mechanism import MechanismKind, ShakenMechanism, shaken_mechanism
 from rbfrag.solver.quantity import number, positive
 from rbfrag.solver.results import (
     SEARCH_LIMIT,
@@ -38,7 +37,7 @@ from rbfrag.solver.results import (
     SearchPoints,
     Status,
 )
-from rbfrag.solver.simulation import Simulation
+from rbfrag.solver.simulation import MechanismKind, ShakenMechanism, Simulation, shaken_mechanism
 
 SCAN_RATIO = 1.05
 """Ratio of two scales that are looked at one after the other; its square beyond the answer."""
@@ -198,7 +197,20 @@ class ScaledKind(MechanismKind):
         )
         shaken = shaken_mechanism(self, options.pop("block"), **options)
         shaking = Shaking(motion, vertical, polarity)
-        return critical_scale(shaking, shaken, rotation_deg, rules)
+        fails_rad = rotation_rad(rotation_deg)
+        excited = shaking.excitation
+        pga_g = excited.pga_g
+        scale_limit = shaken.yield_g / (rules.search_limit * pga_g) if pga_g > 0.0 else math.inf
+        starts = first_motion(excited, shaken.yield_g)
+
+        def run(scale: float) -> ScaledRun:
+            return scaled_run(shaken.run(excited.scaled(scale)), scale, fails_rad)
+
+        start = ScaleSearch(rotation_deg, pga_g, shaken.yield_g, starts, scale_limit)
+        if starts is None or starts >= scale_limit:
+            # nothing moves below the limit: the closed form of the first motion is the proof
+            return _answer(replace(start, certified=True), shaken, shaking)
+        return _answer(_search(start, run, rules), shaken, shaking)
 
 
 class ScanRules(NamedTuple):
@@ -227,35 +239,6 @@ def scan_rules(search_limit: float, scan_ratio: float, bracket: float) -> ScanRu
     if not ratio > 1.0:
         raise InputError(f"scan_ratio = {ratio:g} is not above 1: give a ratio such as 1.05")
     return ScanRules(limit, ratio, positive(bracket, "bracket", "a width over the scale"))
-
-
-def critical_scale(
-    shaking: Shaking, shaken: ShakenMechanism, rotation_deg: float | None, rules: ScanRules
-) -> CriticalScale:
-    """Return the smallest factor on a record at which a block reaches a given rotation.
-
-    Args:
-        shaking: the motion; its vertical component is scaled with the horizontal one.
-        rotation_deg: peak rotation that counts as failure [deg]; None for failure past recovery.
-        rules: how far and how finely the scales are looked at.
-
-    Raises:
-        InputError: a rotation outside its range.
-    """
-    fails_rad = rotation_rad(rotation_deg)
-    excited = shaking.excitation
-    pga_g = excited.pga_g
-    scale_limit = shaken.yield_g / (rules.search_limit * pga_g) if pga_g > 0.0 else math.inf
-    starts = first_motion(excited, shaken.yield_g)
-
-    def run(scale: float) -> ScaledRun:
-        return scaled_run(shaken.run(excited.scaled(scale)), scale, fails_rad)
-
-    start = ScaleSearch(rotation_deg, pga_g, shaken.yield_g, starts, scale_limit)
-    if starts is None or starts >= scale_limit:
-        # nothing moves below the limit: the closed form of the first motion is the proof
-        return _answer(replace(start, certified=True), shaken, shaking)
-    return _answer(_search(start, run, rules), shaken, shaking)
 
 
 def first_motion(excited: Excitation, yield_g: float) -> float | None:
@@ -339,7 +322,14 @@ def _search(start: ScaleSearch, run: Callable[[float], ScaledRun], rules: ScanRu
         close = first.verdict == "undecided"
         advice = Outcome.UNDETERMINED.advice if close else first.outcome.advice
         return _result(start, runs, None, safe, first.sentence or advice)
-    runs += _look_beyond(run, first.scale, limit, rules.ratio)
+    # stronger records, in steps twice as wide, may spare the block
+    scale = first.scale
+    while scale < limit:
+        scale = min(scale * rules.ratio * rules.ratio, limit)
+        runs.append(run(scale))
+        # where the model has ended, a yet stronger record ends it too
+        if runs[-1].verdict == "outside":
+            break
     return _result(start, runs, (safe, first.scale), limit)
 
 
@@ -411,20 +401,6 @@ def _first_decided(
     closer, _ = _close_in(run, low, high, rules.bracket, passed)
     runs += closer
     return min((*later, *closer), key=lambda item: (item.verdict in passed, item.scale))
-
-
-def _look_beyond(
-    run: Callable[[float], ScaledRun], scale: float, limit: float, ratio: float
-) -> list[ScaledRun]:
-    """Examine stronger records, in steps twice as wide, for scales that spare the block."""
-    runs: list[ScaledRun] = []
-    while scale < limit:
-        scale = min(scale * ratio * ratio, limit)
-        runs.append(run(scale))
-        # where the model has ended, a yet stronger record ends it too
-        if runs[-1].verdict == "outside":
-            break
-    return runs
 
 
 def _result(

@@ -10,9 +10,8 @@ from numpy.typing import NDArray
 
 from rbfrag.solver.integrator.block_excitation import BlockExcitation
 from rbfrag.solver.integrator.compiled import bare_kernel, within
-from rbfrag.solver.search.borders import border
+from rbfrag.solver.search.borders import border, follow
 from rbfrag.solver.search.envelopes import ALL_SAFE, ALL_TOPPLE, NO_ORDER, SPLIT, Decision, decide
-from rbfrag.solver.search.from_rest import follow
 from rbfrag.solver.search.renewal import ExcursionTable, add_work, begin, excursion_table, last_rest
 
 SAFE, TOPPLES, UNKNOWN, ORDERLESS = 0, 1, 2, 3

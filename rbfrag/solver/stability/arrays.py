@@ -25,17 +25,7 @@ from rbfrag.solver.block.formulas import (
     tan_deg,
 )
 from rbfrag.solver.results import FloatArray
-from rbfrag.solver.stability.joint import (
-    LAB_M,
-    NO_FRACTURE,
-    ROCK_KG_M3,
-    OnJoint,
-    is_drained,
-    reject_half,
-    roughened,
-    roughness_at,
-    water_at,
-)
+from rbfrag.solver.stability import joint as joints
 from rbfrag.solver.stability.modes import (
     CONFINED_TOPPLE,
     MODES,
@@ -141,7 +131,7 @@ def stability_arrays(
     cohesion_pa: ArrayLike | None = None,
     density_kg_m3: ArrayLike | None = None,
     nan: Literal["propagate", "raise"] = "propagate",
-    **joint: Unpack[OnJoint[ArrayLike]],
+    **joint: Unpack[joints.OnJoint[ArrayLike]],
 ) -> StabilityArray:
     """Return the failure modes, states and yield accelerations of many parallelogram blocks.
 
@@ -172,14 +162,14 @@ def stability_arrays(
     fields = {"beta_deg": beta_deg, "phi_deg": phi_deg, "kv": kv}
     if phi_back_deg is not None:
         fields["phi_back_deg"] = phi_back_deg
-    reject_half(*(joint.get(name) for name in ("jrc", "jcs_mpa", "joint_length_m")))
+    joints.reject_half(*(joint.get(name) for name in ("jrc", "jcs_mpa", "joint_length_m")))
     on_base = {"cohesion_pa": cohesion_pa, **joint}
     strength: dict[str, Any] = {n: value for n, value in on_base.items() if value is not None}
     if strength:
-        density = ROCK_KG_M3 if density_kg_m3 is None else density_kg_m3
+        density = joints.ROCK_KG_M3 if density_kg_m3 is None else density_kg_m3
         fields |= {**strength, "density_kg_m3": density}
     if joint.get("water_m") is not None and not back_fracture:
-        raise InputError(NO_FRACTURE, fields=("water_m", "back_fracture"))
+        raise InputError(joints.NO_FRACTURE, fields=("water_m", "back_fracture"))
     arrays, shape = common_shape({"blocks": blocks.tan_alpha1, **fields})
 
     def formula(
@@ -203,7 +193,7 @@ def stability_arrays(
         mu2 = _tangent(there["phi_back_deg"]) if "phi_back_deg" in there else mu1
         functions = array_elementwise()
         if "water_m" in there:
-            water, holds = water_at(
+            water, holds = joints.water_at(
                 water_m=there["water_m"], density_kg_m3=there["density_kg_m3"], half_s1_m=h,
                 tan_alpha1=t1, tan_alpha3=t3, cot=cot_gamma(t1, t3), tan_beta=tb,
                 functions=functions,
@@ -215,10 +205,12 @@ def stability_arrays(
         planes = Planes(tb, mu1, mu2, 1.0 + there["kv"], functions, bond, water)
         if "jrc" in there:
             base, length = h * t3 - h * t1, there.get("joint_length_m", 0.0)
-            length = np.maximum(np.where(np.asarray(length) > 0.0, length, base), LAB_M)
+            length = np.maximum(np.where(np.asarray(length) > 0.0, length, base), joints.LAB_M)
             weight = there["density_kg_m3"] * STANDARD_GRAVITY_M_S2 * 2.0 * h
-            rough = roughness_at(there["jrc"], there["jcs_mpa"], length, weight, np.power)
-            planes, secant_deg, _ = roughened(planes, rough, there["phi_deg"])
+            planes, (_, _, _, secant_deg) = joints.roughened(
+                planes, there["phi_deg"], jrc=there["jrc"], jcs_mpa=there["jcs_mpa"],
+                length_m=length, weight_pa=weight, power=np.power,
+            )  # fmt: skip
         mode, k, ky, lifts, floats = _yields(t1, t3, planes, back_fracture)
         reason[(reason == 0) & floats] = FLOATS
         state = state_code(k, planes.functions)
@@ -264,7 +256,7 @@ def _undrained(water_m: ArrayLike, drainage: ArrayLike) -> FloatArray:
     """Return the water [m] that keeps acting while blocks move: none on drained blocks."""
     words = np.asarray(drainage, dtype=str)
     # an empty word, as of a cell that was not filled in, means undrained
-    drained = np.vectorize(lambda word: is_drained(word or None), otypes=[bool])(words)
+    drained = np.vectorize(lambda word: joints.is_drained(word or None), otypes=[bool])(words)
     height_m = np.asarray(water_m, dtype=np.float64)
     return np.where(drained & (height_m > 0.0), 0.0, height_m)
 
@@ -289,25 +281,21 @@ def _yields(
             a1, a3 = t1[rows], t3[rows]
             # in units of half the S1, as `Block.arms` has them
             arms = (a1, -1.0), (-a3, 1.0), (a3, -1.0), (a1, -1.0)
-            rows_planes = _at(planes, rows)
+            # single numbers hold for all rows
+            parts: dict[str, Any] = {
+                name: value[rows]
+                for name in ("tan_beta", "mu1", "mu2", "weight", "bond")
+                if isinstance(value := getattr(planes, name), np.ndarray)
+            }
+            if planes.water is not None:
+                parts["water"] = Water(*(part[rows] for part in vars(planes.water).values()))
+            rows_planes = replace(planes, **parts)
             k[rows], _, lifts[rows] = rows_planes.yield_of(code, arms, cot[rows])
             floats[rows] = rows_planes.floats(k[rows], code, cot[rows])
     if not back_fracture:
         # the weight passes upslope of the heel, and nothing stands there to lean on
         k[planes.tan_beta < t1] = -math.inf
     return mode, k, ky, lifts, floats
-
-
-def _at(planes: Planes[Any], rows: NDArray[np.intp]) -> Planes[Any]:
-    """Return the planes of a selection of the blocks; single numbers hold for all."""
-    names = ("tan_beta", "mu1", "mu2", "weight", "bond")
-    values = {name: getattr(planes, name) for name in names}
-    parts: dict[str, Any] = {
-        name: value[rows] for name, value in values.items() if isinstance(value, np.ndarray)
-    }
-    if planes.water is not None:
-        parts["water"] = Water(*(part[rows] for part in vars(planes.water).values()))
-    return replace(planes, **parts)
 
 
 def _reasons(bad: CodeArray, size: int, inputs: Mapping[str, Any]) -> CodeArray:

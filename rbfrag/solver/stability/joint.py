@@ -1,4 +1,4 @@
-"""Water in the back fracture and roughness of the base, as they enter yield accelerations.
+"""Water in the back fracture, roughness of the base, and what the first slip leaves of a joint.
 
 Formulas for single numbers and for arrays; no numpy is loaded for a single number. Water presses
 on the wetted part of the back plane, V = γw z l/2 at l/3 from the heel with l = z/sin(β + γ), and
@@ -18,12 +18,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any, Generic, NamedTuple, TypedDict, TypeVar
+from typing import Any, Generic, TypedDict, TypeVar
 
 from rbfrag.errors import InputError
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.results.diagnostic import Diagnostic
 from rbfrag.solver.block.formulas import Elementwise, N, tan_deg
+from rbfrag.solver.kinds import KindSpec
 from rbfrag.solver.stability.modes import Planes, Water
 
 V = TypeVar("V")
@@ -148,63 +149,49 @@ def is_drained(drainage: object) -> bool:
     return drainage == DRAINED
 
 
-class Roughness(NamedTuple, Generic[N]):
-    """The roughness of a base at its own length.
+def roughened(
+    planes: Planes[N],
+    phi_deg: N,
+    *,
+    jrc: N,
+    jcs_mpa: N,
+    length_m: N,
+    weight_pa: N,
+    power: Callable[[Any, Any], Any] = pow,
+) -> tuple[Planes[N], tuple[N, N, N, N]]:
+    """Return planes whose base has the secant friction angle at the normal stress of its yield.
+
+    φ = φr + JRCn log10(JCSn/σ) with JRCn = JRC (L/L0)^(-0.02 JRC) and JCSn = JCS (L/L0)^(-0.03
+    JRC), L0 = 0.1 m, and σ at the yield of sliding, which φ decides: repeated halfway to the
+    answer, which converges for all dips because φ is at most :data:`STEEPEST_DEG`.
 
     Args:
-        jrc: joint roughness coefficient JRCn.
-        jcs_pa: compressive strength of the joint's walls JCSn [Pa].
-        weight_pa: weight of the block over its base [Pa].
-    """
-
-    jrc: N
-    jcs_pa: N
-    weight_pa: N
-
-
-def roughness_at(
-    jrc: N, jcs_mpa: N, length_m: N, weight_pa: N, power: Callable[[Any, Any], Any] = pow
-) -> Roughness[N]:
-    """Return JRCn = JRC (L/L0)^(-0.02 JRC) and JCSn = JCS (L/L0)^(-0.03 JRC), L0 = 0.1 m.
-
-    Args:
+        planes: the planes, with water if there is any.
+        phi_deg: residual friction angle of the base φr [deg].
         jrc: joint roughness coefficient of samples of 10 cm.
         jcs_mpa: compressive strength of their walls [MPa].
         length_m: length of the joint that shears as one, from 0.1 m [m].
         weight_pa: weight of the block over its base [Pa].
         power: the power function.
-    """
-    longer = length_m / LAB_M
-    jrc_n = jrc * power(longer, -0.02 * jrc)
-    return Roughness(jrc_n, MEGA * jcs_mpa * power(longer, -0.03 * jrc), weight_pa)
-
-
-def roughened(planes: Planes[N], rough: Roughness[N], phi_deg: N) -> tuple[Planes[N], N, N]:
-    """Return planes whose base has the secant friction angle at the normal stress of its yield.
-
-    φ = φr + JRC log10(JCS/σ) with σ at the yield of sliding, which φ decides: repeated halfway to
-    the answer, which converges for all dips because φ is at most :data:`STEEPEST_DEG`.
-
-    Args:
-        planes: the planes, with water if there is any.
-        rough: the roughness of the base.
-        phi_deg: residual friction angle of the base φr [deg].
 
     Returns:
-        The planes, the secant angle [deg] and the normal stress [Pa].
+        The planes, and JRCn, JCSn [Pa], the normal stress [Pa] and the secant angle [deg].
     """
     where, log10 = planes.functions.where, planes.functions.log10
-    secant, stress = phi_deg, rough.weight_pa
+    longer = length_m / LAB_M
+    jrc_n = jrc * power(longer, -0.02 * jrc)
+    jcs_pa = MEGA * jcs_mpa * power(longer, -0.03 * jrc)
+    secant, stress = phi_deg, weight_pa
     for _ in range(_ROUNDS):
         planes = replace(planes, mu1=tan_deg(secant, planes.functions))
-        stress = rough.weight_pa * planes.pressed_by(planes.ky)
-        weaker = (stress > 0.0) & (stress < rough.jcs_pa)
-        over = log10(rough.jcs_pa / where(weaker, stress, rough.jcs_pa))
-        steep = phi_deg + rough.jrc * over
+        stress = weight_pa * planes.pressed_by(planes.ky)
+        weaker = (stress > 0.0) & (stress < jcs_pa)
+        over = log10(jcs_pa / where(weaker, stress, jcs_pa))
+        steep = phi_deg + jrc_n * over
         steep = where(steep > STEEPEST_DEG, where(phi_deg > STEEPEST_DEG, phi_deg, STEEPEST_DEG),
                       steep)  # fmt: skip
         secant = 0.5 * (secant + steep)
-    return planes, secant, stress
+    return planes, (jrc_n, jcs_pa, stress, secant)
 
 
 @dataclass(frozen=True)
@@ -228,40 +215,54 @@ class JointStrength:
     intercept_pa: float
 
     @classmethod
-    def of(cls, rough: Roughness[float], secant_deg: float, stress_pa: float) -> JointStrength:
-        """Return the strength at a secant angle [deg] and a normal stress [Pa]."""
+    def of(cls, jrc: float, jcs_pa: float, stress_pa: float, secant_deg: float) -> JointStrength:
+        """Return the strength at a normal stress [Pa] and its secant angle [deg]."""
         secant = math.tan(math.radians(secant_deg))
         falls = 0.0
-        if 0.0 < stress_pa < rough.jcs_pa and secant_deg < STEEPEST_DEG:
-            falls = math.radians(rough.jrc) / math.log(10.0) * (secant * secant + 1.0)
-        tangent = secant - falls
-        return cls(
-            rough.jrc, rough.jcs_pa / MEGA, stress_pa, secant_deg,
-            math.degrees(math.atan(tangent)), stress_pa * falls,
-        )  # fmt: skip
+        if 0.0 < stress_pa < jcs_pa and secant_deg < STEEPEST_DEG:
+            falls = math.radians(jrc) / math.log(10.0) * (secant * secant + 1.0)
+        tangent_deg = math.degrees(math.atan(secant - falls))
+        return cls(jrc, jcs_pa / MEGA, stress_pa, secant_deg, tangent_deg, stress_pa * falls)
 
-
-OF_ROUGHNESS = ("jrc", "jcs_mpa")
 
 NO_FRACTURE = (
     "water_m cannot be combined with a block without a back fracture: that is where the water "
     "stands"
 )
 
-NOT_OF_OUTLINES = (
-    "water_m is known of blocks between two pairs of fractures (rectangles, angles, spacings), not "
-    "of outlines"
+JOINT = ("water_m", "drainage", "jrc", "jcs_mpa", "joint_length_m", "phi_residual_deg")
+"""Inputs of a joint besides bond and friction: those of `OnJoint` and the residual friction."""
+
+ENDED = frozenset(
+    {"jrc", "jcs_mpa", "joint_length_m", "phi_residual_deg", "cohesion_pa", "phi_back_deg"}
+)
+"""Keywords of planes that the first slip ends, or that the residual friction takes the place of."""
+
+STATE_RESIDUAL = "give phi_residual_deg, the friction angle that is left, for the answer after it"
+
+_ENDS = (
+    " ends with the first slip (yield {k:.4g} g, {mode}), and no displacement or probability "
+    f"follows from it: {STATE_RESIDUAL}"
+)
+ROUGH = f"jrc cannot be combined with a probability or a time history of {{kind}}: roughness{_ENDS}"
+
+SLIPS_ON = (
+    "after its first slip (yield {k:.4g} g, {mode}) the block does not stand on phi_residual_deg: "
+    "it fails where the motion exceeds that yield, and no model is needed"
 )
 
-SPILLS_OVER = (
-    "water_m = {water:g} stands above the top of the back fracture, {top:.4g} m above the heel, or "
-    "the fracture does not rise from the heel: give the height that it holds"
+AFTER_SLIP = Diagnostic(
+    "the answer is that of the block after its first slip, without bond or roughness, on "
+    "phi_residual_deg; before it the yield of the block is another one (rbfrag block prints it), "
+    "and a motion below that does nothing",
+    "after_first_slip",
+    fields=("phi_residual_deg",),
 )
 
-AFLOAT = (
-    "the water lifts the block off its base (the reaction of the base at the yield is below zero): "
-    "it floats, and no yield acceleration describes it; lower water_m"
-)
+
+def slips_on_base(facts: KindSpec) -> bool:
+    """Return whether blocks of a kind slip on their base; a topple turns about its toe."""
+    return facts.free_standing or "p2" not in facts.parameters
 
 
 def reject_half(jrc: object, jcs_mpa: object, joint_length_m: object) -> None:
@@ -272,7 +273,7 @@ def reject_half(jrc: object, jcs_mpa: object, joint_length_m: object) -> None:
     """
     inputs = {"jrc": jrc, "jcs_mpa": jcs_mpa, "joint_length_m": joint_length_m}
     present = [name for name, value in inputs.items() if value is not None]
-    for name in OF_ROUGHNESS:
+    for name in ("jrc", "jcs_mpa"):
         if present and inputs[name] is None:
             raise InputError(
                 f"{name} is missing: the roughness of a joint is jrc with jcs_mpa, and phi_deg is "

@@ -1,4 +1,4 @@
-"""Failure modes and yield accelerations of a block, for single numbers and arrays.
+"""Failure modes, yield accelerations and parameters at rest, for single numbers and arrays.
 
 At the yield of a mechanism friction is mobilised at both of its contacts. Their reactions then
 have directions u_a and u_b, and because they hold the block in moment equilibrium their ratio
@@ -8,9 +8,12 @@ the base, tan δ* = -F_x/F_y, so that (eqs. 3.16-3.29)
 
     k = (1 + k_v) tan(δ* - β).
 
-The functions here return (-F_x, F_y), the sine and cosine of δ* up to a positive factor, and do
+The yields here use (-F_x, F_y), the sine and cosine of δ* up to a positive factor, and do
 without any angle: u_a and u_b are scaled by 1/cos φ1 and 1/(sin γ cos φ2), so that tangents and
 cot γ are enough.
+
+At rest predictions use p_s² of blocks on two sliding contacts, and p², k_r and restitution of
+free-standing ones. No numpy is loaded for a single number.
 """
 
 from __future__ import annotations
@@ -20,7 +23,8 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Generic, Literal
 
-from rbfrag.solver.block.formulas import Elementwise, N
+from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
+from rbfrag.solver.block.formulas import Elementwise, N, corner_distance, moments_about_corners
 
 ModeName = Literal["slide", "topple", "slump", "confined_topple"]
 StateName = Literal["stable", "unstable", "locked"]
@@ -38,46 +42,7 @@ AT_LIMIT = 1e-12
 """A yield acceleration coefficient nearer to zero than this is zero: stable, at its limit."""
 
 _SQUARE = 1e-12
-"""Cosine of δ* - β below which the reaction is taken to be level: no k can be told from ∞."""
-
-
-def slump(heel_x: N, heel_y: N, back_x: N, back_y: N, cot: N, mu1: N, mu2: N) -> tuple[N, N, N, N]:
-    """Return (-F_x, F_y, R_base, R_back) of slumping, up to a factor (eqs. 3.24, 3.25).
-
-    Args:
-        heel_x: from the centroid to the heel, along the base.
-        heel_y: the same, normal to the base.
-        back_x: from the centroid to the back contact, along the base.
-        back_y: the same, normal to the base.
-        mu1: tangent of the friction angle of the base.
-        mu2: tangent of the friction angle of the back plane.
-    """
-    u_x, u_y = 1.0 - cot * mu2, cot + mu2
-    r_base = back_y * u_x - back_x * u_y
-    r_back = heel_x + heel_y * mu1
-    return r_base * mu1 - r_back * u_x, r_base + r_back * u_y, r_base, r_back
-
-
-def confined_topple(
-    toe_x: N, toe_y: N, low_x: N, low_y: N, cot: N, mu1: N, mu2: N
-) -> tuple[N, N, N, N]:
-    """Return (-F_x, F_y, R_base, R_back) of confined toppling, up to a factor (eqs. 3.28, 3.29).
-
-    The moments are paired as equilibrium demands; the printed equations pair them the other way
-    round.
-
-    Args:
-        toe_x: from the centroid to the toe, along the base.
-        toe_y: the same, normal to the base.
-        low_x: from the centroid to the lowest point on the back plane, along the base.
-        low_y: the same, normal to the base.
-        mu1: tangent of the friction angle of the base.
-        mu2: tangent of the friction angle of the back plane.
-    """
-    u_x, u_y = 1.0 + cot * mu2, cot - mu2
-    r_base = low_x * u_y - low_y * u_x
-    r_back = -(toe_x + toe_y * mu1)
-    return r_base * mu1 - r_back * u_x, r_base + r_back * u_y, r_base, r_back
+"""Cosine of δ* - β below which the reaction is assumed to be level, and k to be infinite."""
 
 
 def yield_coefficient(
@@ -110,18 +75,6 @@ def yield_coefficient(
     k = numerator / where(level, 1.0, denominator)
     result: N = where(level, where(numerator > 0.0, math.inf, -math.inf), k)
     return result
-
-
-def wedges(cot: N, mu1: N, mu2: N) -> Any:
-    """Return whether both planes hold a confined topple between them: γ + φ1 + φ2 > 180°."""
-    # sin(γ + φ1 + φ2) over sin γ cos φ1 cos φ2, all three positive
-    return (cot - mu2) * mu1 + cot * mu2 + 1.0 < 0.0
-
-
-def back_is_rougher(cot: N, mu1: N, mu2: N) -> Any:
-    """Return whether the back plane of a slump is stronger than its base: φ2 > φ1 + γ."""
-    # sin(γ + φ1 - φ2) over the same
-    return (cot + mu2) * mu1 - cot * mu2 + 1.0 < 0.0
 
 
 def on_its_branch(k: N, ky: N, rises: object, functions: Elementwise[N]) -> N:
@@ -192,33 +145,6 @@ def state_code(k: N, functions: Elementwise[N]) -> N:
     where = functions.where
     result: N = where(k < -AT_LIMIT, UNSTABLE, where(k == math.inf, LOCKED, STABLE))
     return result
-
-
-def toe_lifts(
-    k: N,
-    r_base: N,
-    cosine: N,
-    pull: N,
-    tan_beta: N,
-    weight: N | float,
-    bond: N,
-    functions: Elementwise[N],
-) -> Any:
-    """Return whether the toe would have to pull at the yield of a confined topple with a bond.
-
-    Args:
-        k: yield acceleration coefficient, finite.
-        r_base: reaction of the base, up to the factor of `cosine`.
-        cosine: cos δ* up to that factor.
-        pull: what a bond of 1 m g takes from the reaction, in the same scale.
-        tan_beta: tangent of the dip of the base.
-        weight: 1 + k_v.
-        bond: strength of the base's bond over the weight.
-        functions: the functions for this kind of number.
-    """
-    normal = (weight - k * tan_beta) / functions.sqrt(1.0 + tan_beta * tan_beta)
-    pressed = normal * r_base + bond * pull
-    return ((pressed <= 0.0) & (cosine > 0.0)) | ((pressed >= 0.0) & (cosine < 0.0))
 
 
 @dataclass(frozen=True)
@@ -367,37 +293,58 @@ class Planes(Generic[N]):
         return (carried <= 0.0) & (abs(k) < math.inf) & (self.water.along != 0.0)
 
     def slump(self, heel_x: N, heel_y: N, back_x: N, back_y: N, cot: N) -> tuple[N, Any]:
-        """Return k_s, and whether the back contact cannot hold the block, which is then unstable.
+        """Return k_s (eqs. 3.24, 3.25), and whether the back contact cannot hold the block.
 
-        The arguments are those of :func:`slump`.
+        Args:
+            heel_x: from the centroid to the heel, along the base.
+            heel_y: the same, normal to the base.
+            back_x: from the centroid to the back contact, along the base.
+            back_y: the same, normal to the base.
+            cot: cot γ.
         """
-        contacts, where = (heel_x, heel_y, back_x, back_y, cot), self.functions.where
-        sine, cosine, r_base, _ = slump(*contacts, self.mu1, self.mu2)
-        turn = 1.0 - cot * self.mu2 + self.mu1 * (cot + self.mu2)
-        k = self.coefficient(sine, cosine, turn, heel_y)
-        k = on_its_branch(k, self.ky, back_is_rougher(cot, self.mu1, self.mu2), self.functions)
-        # moments balance only if the base pulls: nothing holds the block
+        mu1, mu2, where = self.mu1, self.mu2, self.functions.where
+        u_x, u_y = 1.0 - cot * mu2, cot + mu2
+        r_base = back_y * u_x - back_x * u_y
+        r_back = heel_x + heel_y * mu1
+        sine, cosine = r_base * mu1 - r_back * u_x, r_base + r_back * u_y
+        k = self.coefficient(sine, cosine, u_x + mu1 * u_y, heel_y)
+        # sin(γ + φ1 - φ2) over sin γ cos φ1 cos φ2: is the back plane stronger, φ2 > φ1 + γ?
+        back_is_rougher = u_y * mu1 - cot * mu2 + 1.0 < 0.0
+        k = on_its_branch(k, self.ky, back_is_rougher, self.functions)
+        # moments balance only if the base pulls: nothing holds the block, which is unstable
         untenable = r_base <= 0.0
         return where(untenable, -math.inf, k), untenable
 
     def confined_topple(self, toe_x: N, toe_y: N, low_x: N, low_y: N, cot: N) -> tuple[N, Any]:
-        """Return k_ct, and whether the bond lets the toe lift off first; see :func:`toe_lifts`.
+        """Return k_ct (eqs. 3.28, 3.29), and whether the toe lifts off a bond before it slides.
 
-        The arguments are those of :func:`confined_topple`.
+        The moments are paired as equilibrium demands; the printed equations pair them the other way
+        round. The toe lifts where the bond would have to bear tension at the yield.
+
+        Args:
+            toe_x: from the centroid to the toe, along the base.
+            toe_y: the same, normal to the base.
+            low_x: from the centroid to the lowest point on the back plane, along the base.
+            low_y: the same, normal to the base.
+            cot: cot γ.
         """
-        contacts, where = (toe_x, toe_y, low_x, low_y, cot), self.functions.where
-        sine, cosine, r_base, _ = confined_topple(*contacts, self.mu1, self.mu2)
-        turn = -(1.0 + cot * self.mu2 + self.mu1 * (cot - self.mu2))
-        k = self.coefficient(sine, cosine, turn, toe_y)
-        k = on_its_branch(k, self.ky, wedges(cot, self.mu1, self.mu2), self.functions)
+        mu1, mu2, where = self.mu1, self.mu2, self.functions.where
+        u_x, u_y = 1.0 + cot * mu2, cot - mu2
+        r_base = low_x * u_y - low_y * u_x
+        r_back = -(toe_x + toe_y * mu1)
+        sine, cosine = r_base * mu1 - r_back * u_x, r_base + r_back * u_y
+        k = self.coefficient(sine, cosine, -(u_x + mu1 * u_y), toe_y)
+        # sin(γ + φ1 + φ2), likewise: do both planes hold the block between them, beyond 180°?
+        wedges = u_y * mu1 + cot * mu2 + 1.0 < 0.0
+        k = on_its_branch(k, self.ky, wedges, self.functions)
         # α1 + γ + φ2 >= 180°: the heel jams, whatever pushes it
         k = where(r_base <= 0.0, math.inf, k)
         if self.bond is None:
             return k, False
-        pull = toe_y * (cot - self.mu2)
-        lifts = toe_lifts(
-            k, r_base, cosine, pull, self.tan_beta, self.weight, self.bond, self.functions
-        )
+        normal = (self.weight - k * self.tan_beta) / self._slope
+        # over the factor of sine and cosine; a bond of 1 m g takes toe_y (cot γ - μ2) from it
+        pressed = normal * r_base + self.bond * (toe_y * u_y)
+        lifts = ((pressed <= 0.0) & (cosine > 0.0)) | ((pressed >= 0.0) & (cosine < 0.0))
         return k, lifts & (self.bond > 0.0) & (abs(k) < math.inf)
 
     def mode(self, tan_alpha1: N, tan_alpha3: N, confined: object, *, back_fracture: bool) -> N:
@@ -432,3 +379,86 @@ class Planes(Generic[N]):
 def words_of_mode(mode: str) -> str:
     """Return the name of a mode for use in a sentence."""
     return mode.replace("_", " ")
+
+
+def two_contacts_at_rest(
+    block: Any,
+    *,
+    confined: bool,
+    beta_deg: Any,
+    phis_deg: tuple[Any, Any],
+    functions: Elementwise[Any],
+    trigonometry: Any,
+) -> Any:
+    """Return p_s² of parallelograms at rest [1/s²].
+
+    p_s² = g (F_y cos β - F_x sin β)/D with the contact forces of a slump, or a confined topple,
+    that starts; NaN where there is none.
+
+    Args:
+        block: a `Block`, or several as a `BlockArray`.
+        confined: whether they topple confined, instead of slumping.
+        beta_deg: dip of the base [deg].
+        phis_deg: friction angles of the base and of the back plane [deg].
+        functions: the functions for this kind of number.
+        trigonometry: what has its ``sin``, ``cos`` and ``radians``: math, or numpy.
+    """
+    where, sin, cos = functions.where, trigonometry.sin, trigonometry.cos
+    angles = (block.alpha1_deg, block.alpha3_deg, block.gamma_deg, beta_deg, *phis_deg)
+    a1, a3, gamma, beta, phi1, phi2 = (trigonometry.radians(angle) for angle in angles)
+    r1_m, r3_m = block.r1_m, block.r3_m
+    if confined:  # A, B and C' of docs/theory/confined-toppling.md
+        pulls = gamma + phi2
+        base_edge = r3_m * sin(a3) - r1_m * sin(a1)
+        on_base, on_back = r1_m * sin(a1 + pulls), r3_m * sin(phi1 - a3)
+        path_x = r3_m * cos(a3) - base_edge * cos(gamma) / sin(gamma)
+        path_y = r3_m * sin(a3)
+    else:  # of docs/theory/slumping.md
+        pulls = gamma - phi2
+        back_edge = 2.0 * r1_m * cos(a1) / sin(gamma)
+        on_base, on_back = r3_m * sin(a3 + pulls), r1_m * sin(a1 - phi1)
+        path_x, path_y = back_edge / sin(gamma) - r1_m * cos(a1), -r1_m * sin(a1)
+    force_x = -on_base * sin(phi1) + on_back * sin(pulls)
+    force_y = on_base * cos(phi1) + on_back * cos(pulls)
+    inertia_m2 = (r1_m * r1_m + r3_m * r3_m) / 6.0
+    inertia = force_y * path_x - force_x * path_y + inertia_m2 * sin(pulls + phi1)
+    pull = STANDARD_GRAVITY_M_S2 * (force_y * cos(beta) - force_x * sin(beta))
+    turns = (inertia > 0.0) & (pull > 0.0)
+    return where(turns, pull / where(turns, inertia, 1.0), math.nan)
+
+
+def rocking_at_rest(
+    block: Any, tan_beta: Any, functions: Elementwise[Any]
+) -> tuple[Any, Any, Any, Any, Any]:
+    """Return k_r of both senses, forward and backward, p², restitution, and 90° less the balance
+    angles.
+
+    Predictions are about symmetric blocks on level ground: of another block, about the one that is
+    as weak as its weaker sense, whose p² [1/s²] is returned, and loses as much speed in two
+    impacts, √(e31 e13) (Housner 1963).
+
+    Args:
+        block: a `Block`, or several as a `BlockArray`.
+        tan_beta: tangent of the dip of the base.
+        functions: the functions for this kind of number.
+
+    Returns:
+        k_r about the toe and about the heel, at most 0 for a block that falls over it; p² of the
+        weaker of the two; the restitution; and the least cosine of both critical angles up to a
+        positive factor, at most 0 where one is 90° or more.
+    """
+    t1, t3, half_s1_m = block.tan_alpha1, block.tan_alpha3, block.half_s1_m
+    where, sqrt = functions.where, functions.sqrt
+    steep = 1.0 + t3 * tan_beta, 1.0 + t1 * tan_beta
+    least = where(steep[0] < steep[1], steep[0], steep[1])
+    forward = (t3 - tan_beta) / where(steep[0] > 0.0, steep[0], 1.0)
+    backward = (tan_beta - t1) / where(steep[1] > 0.0, steep[1], 1.0)
+    heel, toe = ((half_s1_m * t, -half_s1_m) for t in (t1, t3))
+    about_toe, about_heel, momentum = moments_about_corners(block.inertia_m2, heel, toe)
+    per_moment = where(
+        forward <= backward,
+        corner_distance(half_s1_m, t3, functions) / about_toe,
+        corner_distance(half_s1_m, t1, functions) / about_heel,
+    )
+    restitution = where(momentum > 0.0, momentum, 0.0) / sqrt(about_toe * about_heel)
+    return forward, backward, STANDARD_GRAVITY_M_S2 * per_moment, restitution, least

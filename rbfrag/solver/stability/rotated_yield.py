@@ -1,7 +1,7 @@
 """Yield accelerations of a block that has already rotated by an angle θ.
 
 Lengths and γ keep their values at rest; only the arms turn. In terms of the block angles: a
-slump has α + θ, a topple α - θ, but γ must not be computed anew from them.
+slump has α + θ, a topple α - θ, but γ must not be computed again from them.
 
 Where the rock behind the block gives way with it, the back plane turns by a share of the block's
 rotation in the block's sense (Gibson's dissertation, Fig. 3.20b): γ - share θ behind a slump, which
@@ -17,8 +17,7 @@ from typing import Any, NamedTuple
 
 from rbfrag.errors import InputError
 from rbfrag.solver.block.formulas import SCALAR, Elementwise, N, array_elementwise, tan_deg
-from rbfrag.solver.block.geometry import Block
-from rbfrag.solver.block.polygon import Point
+from rbfrag.solver.block.geometry import Block, Point
 from rbfrag.solver.quantity import angle, friction_angle, number, vertical_g
 from rbfrag.solver.stability.modes import ModeName, Planes, yield_coefficient
 
@@ -42,7 +41,7 @@ def kr_after_rotation(block: Block, theta_deg: N, *, beta_deg: float, kv: float 
     weight = 1.0 + vertical_g(kv)
 
     def formula(_turn: Any, cosine: Any, sine: Any, functions: Elementwise[Any]) -> Any:
-        toe_x, toe_y = _turned(block.arms.toe, cosine, -sine)
+        toe_x, toe_y = _turned(block.arms[2], cosine, -sine)
         return yield_coefficient(toe_x, -toe_y, tb, weight, functions)
 
     limit_deg = 180.0 - block.gamma_deg
@@ -87,8 +86,7 @@ def ks_after_rotation(
         )
 
     def formula(turn: Any, cosine: Any, sine: Any, functions: Elementwise[Any]) -> Any:
-        heel = _turned(block.arms.heel, cosine, sine)
-        back = _turned(block.arms.back, cosine, sine)
+        heel, back = (_turned(arm, cosine, sine) for arm in block.arms[:2])
         cot = _cot_of_back(block, -share * turn, functions)
         return replace(planes, functions=functions).slump(*heel, *back, cot)[0]
 
@@ -135,8 +133,7 @@ def kct_after_rotation(
         )
 
     def formula(turn: Any, cosine: Any, sine: Any, functions: Elementwise[Any]) -> Any:
-        toe = _turned(block.arms.toe, cosine, -sine)
-        low = _turned(block.arms.lowest_on_back, cosine, -sine)
+        toe, low = (_turned(arm, cosine, -sine) for arm in block.arms[2:])
         cot = _cot_of_back(block, share * turn, functions)
         return replace(planes, functions=functions).confined_topple(*toe, *low, cot)[0]
 
@@ -216,8 +213,13 @@ _FLAT = 1e-15
 def _cot_of_back(block: Block, turn: Any, functions: Elementwise[Any]) -> Any:
     """Return cot(γ + turn) [turn in rad], of the angle at rest where nothing turns."""
     cot = block.cot_gamma
+    trigonometry: Any = math
+    if not isinstance(turn, float):
+        import numpy as np
+
+        trigonometry = np
     # sine and cosine of γ + turn, over sin γ
-    cosine, sine = _wave(turn)
+    cosine, sine = trigonometry.cos(turn), trigonometry.sin(turn)
     along, across = cot * cosine - sine, cosine + cot * sine
     turned = along / functions.where(across < _FLAT, _FLAT, across)
     return functions.where(turn == 0.0, cot, turned)
@@ -235,15 +237,6 @@ def _turned(arm: Point, cosine: Any, sine: Any) -> tuple[Any, Any]:
     """Return an arm turned counter-clockwise."""
     x, y = arm
     return x * cosine - y * sine, x * sine + y * cosine
-
-
-def _wave(turn: Any) -> tuple[Any, Any]:
-    """Return cosine and sine of a number or an array [rad]."""
-    if isinstance(turn, float):
-        return math.cos(turn), math.sin(turn)
-    import numpy as np
-
-    return np.cos(turn), np.sin(turn)
 
 
 def _over(theta_deg: Any, formula: Callable[..., Any], limit_deg: float, why: str) -> Any:

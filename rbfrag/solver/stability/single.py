@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any, Unpack
 
 from rbfrag.errors import InputError
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
+from rbfrag.results.diagnostic import Diagnostic
 from rbfrag.results.numbers import rounded
 from rbfrag.results.result import Result, TextLine, TextTable
 from rbfrag.solver.block.formulas import SCALAR, bond_over_weight, tan_deg
 from rbfrag.solver.block.geometry import Block
+from rbfrag.solver.kinds import facts_of, kind_of_mode
 from rbfrag.solver.quantity import (
     angle,
     friction_angle,
@@ -22,31 +24,7 @@ from rbfrag.solver.quantity import (
     positive,
     vertical_g,
 )
-from rbfrag.solver.stability.joint import (
-    AFLOAT,
-    ASSUMED_DENSITY,
-    DRAINED,
-    LAB_M,
-    NO_EFFECT_OF_COHESION,
-    NO_FRACTURE,
-    NOT_OF_OUTLINES,
-    ROCK_KG_M3,
-    SPILLS_OVER,
-    JointStrength,
-    OnJoint,
-    is_drained,
-    reject_half,
-    roughened,
-    roughness_at,
-    water_at,
-)
-from rbfrag.solver.stability.margins import (
-    Margin,
-    MarginFacts,
-    degrees_of,
-    margins,
-    warnings_about,
-)
+from rbfrag.solver.stability import joint as joints
 from rbfrag.solver.stability.modes import (
     MODES,
     STATES,
@@ -55,11 +33,18 @@ from rbfrag.solver.stability.modes import (
     Planes,
     Push,
     StateName,
+    Water,
     state_code,
     words_of_mode,
     yield_coefficient,
 )
-from rbfrag.solver.stability.toe_stability import toe_slips_g
+from rbfrag.solver.stability.validity import (
+    Margin,
+    MarginFacts,
+    margins,
+    toe_slips_g,
+    warnings_about,
+)
 
 YIELDS = {
     "slide": "Yield acceleration of sliding {} g",
@@ -130,7 +115,7 @@ class Stability(Result):
         push: what water that keeps acting does to the block: forces down the base and off it over
             the weight, and the moment about the centroid, counter-clockwise, over the weight [m];
             None for a dry or drained block.
-        drained: yield acceleration of the drained block, the bound beside that of the undrained
+        drained: yield acceleration of the drained block, the bound next to that of the undrained
             one; None without water.
         warnings: sentences on what the answer takes for granted.
     """
@@ -152,7 +137,7 @@ class Stability(Result):
     margins: tuple[Margin, ...]
     cohesion: Cohesion | None
     warnings: tuple[str, ...]
-    joint: JointStrength | None = None
+    joint: joints.JointStrength | None = None
     water_m: float = 0.0
     toe_slips_g: float | None = None
     push: Push | None = None
@@ -221,7 +206,7 @@ def stability(
     back_fracture: bool = True,
     cohesion_pa: float = 0.0,
     density_kg_m3: float | None = None,
-    **joint: Unpack[OnJoint[float]],
+    **joint: Unpack[joints.OnJoint[float]],
 ) -> Stability:
     """Return the failure mode of a block, its state and its yield acceleration.
 
@@ -248,22 +233,33 @@ def stability(
         "beta_deg": beta_deg, "phi_deg": phi_deg, "phi_back_deg": phi_back_deg, "kv": kv,
         "back_fracture": back_fracture, "cohesion_pa": cohesion_pa, "density_kg_m3": density_kg_m3,
     }  # fmt: skip
-    finding, planes, strength = judged(block, **question, **joint)
+    finding, planes, strength = assess_stability(block, **question, **joint)
     water_m = float(joint.get("water_m") or 0.0)
     drained = None
     if water_m > 0.0:
-        dry: dict[str, Any] = {**joint, "drainage": DRAINED}
-        drained = DrainedYield(judged(block, **question, **dry)[0].k)
+        dry: dict[str, Any] = {**joint, "drainage": joints.DRAINED}
+        drained = DrainedYield(assess_stability(block, **question, **dry)[0].k)
     push = push_of(block, planes)
     assumed: tuple[str, ...] = ()
     if density_kg_m3 is None and (cohesion_pa or water_m or strength):
-        assumed = (ASSUMED_DENSITY,)
+        assumed = (joints.ASSUMED_DENSITY,)
     if planes.bond and finding.mode == "topple":
-        assumed = (*assumed, NO_EFFECT_OF_COHESION)
+        assumed = (*assumed, joints.NO_EFFECT_OF_COHESION)
     beta_deg, bond, k = finding.beta_deg, planes.bond or 0.0, finding.k
     slips_g = math.inf
     if finding.mode == "topple":
         slips_g = toe_slips_g(block, beta_deg, finding.phi_deg, push)
+    cohesion = None
+    if bond:
+        equivalent = planes.mu1 + bond
+        cohesion = Cohesion(
+            ratio=bond,
+            ky=planes.ky,
+            phi_equivalent_deg=math.degrees(math.atan(equivalent)),
+            ky_equivalent=yield_coefficient(
+                equivalent, 1.0, planes.tan_beta, planes.weight, SCALAR
+            ),
+        )
     yields = {mode: k if mode == finding.mode else None for mode in MODES}
     return Stability(
         block=block,
@@ -274,7 +270,9 @@ def stability(
         kr=yields["topple"],
         ks=yields["slump"],
         kct=yields["confined_topple"],
-        delta_deg=beta_deg + degrees_of(k / planes.weight) if math.isfinite(k) else None,
+        delta_deg=beta_deg + math.degrees(math.atan(k / planes.weight))
+        if math.isfinite(k)
+        else None,
         beta_deg=beta_deg,
         phi_deg=finding.phi_deg,
         phi_back_deg=finding.phi_back_deg,
@@ -283,10 +281,10 @@ def stability(
         margins=margins(
             block,
             finding,
-            degrees_of(planes.limit) if bond or planes.water else finding.phi_deg,
+            math.degrees(math.atan(planes.limit)) if bond or planes.water else finding.phi_deg,
             partial(_friction_that_slides_at, beta_deg=beta_deg, planes=planes),
         ),
-        cohesion=_cohesion(planes, bond) if bond else None,
+        cohesion=cohesion,
         warnings=(*warnings_about(block, finding), *assumed),
         joint=strength,
         water_m=water_m,
@@ -296,7 +294,7 @@ def stability(
     )
 
 
-def judged(
+def assess_stability(
     block: Block,
     *,
     beta_deg: float,
@@ -306,8 +304,8 @@ def judged(
     back_fracture: bool = True,
     cohesion_pa: float = 0.0,
     density_kg_m3: float | None = None,
-    **joint: Unpack[OnJoint[float]],
-) -> tuple[MarginFacts, Planes[float], JointStrength | None]:
+    **joint: Unpack[joints.OnJoint[float]],
+) -> tuple[MarginFacts, Planes[float], joints.JointStrength | None]:
     """Return the mode and yield of a block, its planes and the effect of roughness on its friction.
 
     Arguments as for :func:`stability`.
@@ -320,19 +318,32 @@ def judged(
     beta_deg = angle(beta_deg, "beta_deg", -90.0, 90.0)
     phi_deg = friction_angle(phi_deg, "phi_deg")
     phi_back_deg = phi_deg if phi_back_deg is None else friction_angle(phi_back_deg, "phi_back_deg")
-    bond = _bond(block, cohesion_pa, density_kg_m3)
+    cohesion = not_negative(cohesion_pa, "cohesion_pa", "Pa")
+    density = joints.ROCK_KG_M3
+    if density_kg_m3 is not None:
+        density = positive(density_kg_m3, "density_kg_m3", "kg/m³")
+    bond = bond_over_weight(cohesion, density, block.base_m, block.area_m2)
     tb, mu1, mu2 = (tan_deg(value, SCALAR) for value in (beta_deg, phi_deg, phi_back_deg))
     planes = Planes(tb, mu1, mu2, 1.0 + vertical_g(kv), SCALAR, bond or None)
     t1, t3 = block.tan_alpha1, block.tan_alpha3
     water_m = not_negative(joint.get("water_m") or 0.0, "water_m", "m")
     # the drained block is a dry one
-    if not is_drained(joint.get("drainage")) and water_m > 0.0:
-        planes = _wet(block, planes, water_m, density_kg_m3, back_fracture)
+    if not joints.is_drained(joint.get("drainage")) and water_m > 0.0:
+        if not back_fracture:
+            raise InputError(joints.NO_FRACTURE, fields=("water_m", "back_fracture"))
+        planes = replace(planes, water=_water_on(block, tb, water_m, density))
     strength = None
     jrc, jcs_mpa, length_m = (joint.get(name) for name in ("jrc", "jcs_mpa", "joint_length_m"))
-    reject_half(jrc, jcs_mpa, length_m)
+    joints.reject_half(jrc, jcs_mpa, length_m)
     if jrc is not None:
-        planes, strength = _rough(block, planes, phi_deg, jrc, jcs_mpa, length_m, density_kg_m3)
+        coefficient = not_negative(jrc, "jrc", "")
+        length_m = positive(block.base_m if length_m is None else length_m, "joint_length_m", "m")
+        planes, rough = joints.roughened(
+            planes, phi_deg, jrc=coefficient, jcs_mpa=positive(jcs_mpa, "jcs_mpa", "MPa"),
+            length_m=max(length_m, joints.LAB_M),
+            weight_pa=density * STANDARD_GRAVITY_M_S2 * block.area_m2 / block.base_m,
+        )  # fmt: skip
+        strength = joints.JointStrength.of(*rough)
         phi_deg = strength.secant_deg
     code = int(planes.mode(t1, t3, block.confines, back_fracture=back_fracture))
     # the weight passes upslope of the heel, and nothing stands there to lean on
@@ -340,7 +351,11 @@ def judged(
     k, untenable, lifts = planes.yield_of(code, block.arms, block.cot_gamma)
     k = -math.inf if backward else k
     if planes.floats(k, code, block.cot_gamma):
-        raise InputError(AFLOAT, fields=("water_m",))
+        raise InputError(
+            "the water lifts the block off its base (the reaction of the base at the yield is "
+            "below zero): it floats, and no yield acceleration describes it; lower water_m",
+            fields=("water_m",),
+        )
     finding = MarginFacts(
         MODES[code], STATES[int(state_code(k, SCALAR))], k, beta_deg, phi_deg, phi_back_deg,
         back_fracture, backward, untenable and back_fracture, lifts,
@@ -356,54 +371,29 @@ def push_of(block: Block, planes: Planes[float]) -> Push | None:
     return water.along, water.normal, water.moment * block.half_s1_m
 
 
-def _density(density_kg_m3: object) -> float:
-    """Return the density of the rock [kg/m³], by default that of most rocks."""
-    return positive(
-        ROCK_KG_M3 if density_kg_m3 is None else density_kg_m3, "density_kg_m3", "kg/m³"
-    )
-
-
-def _wet(
-    block: Block, planes: Planes[float], water_m: float, density_kg_m3: object, backed: bool
-) -> Planes[float]:
-    """Return the planes with the push of water on a block."""
-    density = _density(density_kg_m3)
-    if not backed:
-        raise InputError(NO_FRACTURE, fields=("water_m", "back_fracture"))
+def _water_on(block: Block, tan_beta: float, water_m: float, density: float) -> Water[float]:
+    """Return the push of water on a block, or reject it with the reason."""
     if not block.is_parallelogram:
-        raise InputError(NOT_OF_OUTLINES, fields=("water_m",))
-    water, holds = water_at(
+        raise InputError(
+            "water_m is known of blocks between two pairs of fractures (rectangles, angles, "
+            "spacings), not of outlines",
+            fields=("water_m",),
+        )
+    water, holds = joints.water_at(
         water_m=water_m, density_kg_m3=density, half_s1_m=block.half_s1_m,
         tan_alpha1=block.tan_alpha1, tan_alpha3=block.tan_alpha3, cot=block.cot_gamma,
-        tan_beta=planes.tan_beta, functions=SCALAR,
+        tan_beta=tan_beta, functions=SCALAR,
     )  # fmt: skip
     if not holds:
-        beta = math.atan(planes.tan_beta)
+        beta = math.atan(tan_beta)
         top_m = block.s1_m * (math.cos(beta) + block.cot_gamma * math.sin(beta))
-        text = SPILLS_OVER.format(water=water_m, top=max(top_m, 0.0))
-        raise InputError(text, fields=("water_m",))
-    return replace(planes, water=water)
-
-
-def _rough(
-    block: Block, planes: Planes[float], phi_deg: float, jrc: object, jcs_mpa: object,
-    joint_length_m: object, density_kg_m3: object,
-) -> tuple[Planes[float], JointStrength]:  # fmt: skip
-    """Return the planes with a rough base, and its strength."""
-    coefficient = not_negative(jrc, "jrc", "")
-    density = _density(density_kg_m3)
-    length_m = block.base_m if joint_length_m is None else joint_length_m
-    length_m = max(positive(length_m, "joint_length_m", "m"), LAB_M)
-    weight_pa = density * STANDARD_GRAVITY_M_S2 * block.area_m2 / block.base_m
-    rough = roughness_at(coefficient, positive(jcs_mpa, "jcs_mpa", "MPa"), length_m, weight_pa)
-    planes, secant_deg, stress_pa = roughened(planes, rough, phi_deg)
-    return planes, JointStrength.of(rough, secant_deg, stress_pa)
-
-
-def _bond(block: Block, cohesion_pa: object, density_kg_m3: object) -> float:
-    """Return the strength of the base's bond over the weight, c L/(ρ g A)."""
-    cohesion = not_negative(cohesion_pa, "cohesion_pa", "Pa")
-    return bond_over_weight(cohesion, _density(density_kg_m3), block.base_m, block.area_m2)
+        raise InputError(
+            f"water_m = {water_m:g} stands above the top of the back fracture, "
+            f"{max(top_m, 0.0):.4g} m above the heel, or the fracture does not rise from the heel: "
+            "give the height that it holds",
+            fields=("water_m",),
+        )
+    return water
 
 
 def _friction_that_slides_at(alpha_deg: float, beta_deg: float, planes: Planes[float]) -> float:
@@ -428,16 +418,6 @@ def _friction_that_slides_at(alpha_deg: float, beta_deg: float, planes: Planes[f
     return math.degrees(math.atan2(thrust, normal))
 
 
-def _cohesion(planes: Planes[float], bond: float) -> Cohesion:
-    equivalent = planes.mu1 + bond
-    return Cohesion(
-        ratio=bond,
-        ky=planes.ky,
-        phi_equivalent_deg=degrees_of(equivalent),
-        ky_equivalent=yield_coefficient(equivalent, 1.0, planes.tan_beta, planes.weight, SCALAR),
-    )
-
-
 def rectangle_r3_m(p2: float) -> float:
     """Return the distance from centroid to toe of a rectangle, r3 = 3g/(4p²) [m].
 
@@ -460,22 +440,22 @@ def level_rectangle(p2: float, kr: float) -> tuple[Block, Stability]:
     return block, stability(block, beta_deg=0.0, phi_deg=rough, back_fracture=False)
 
 
-def require_stable(judged: Stability) -> None:
+def require_stable(at_rest: Stability) -> None:
     """Reject a block that fails or is locked at rest, whatever the ground motion.
 
     Raises:
         InputError: it fails at rest, or it does not move under any horizontal acceleration.
     """
-    k = judged.yield_acceleration
-    if judged.state == "locked":
+    k = at_rest.yield_acceleration
+    if at_rest.state == "locked":
         raise InputError(
-            f"the block is locked in its mode, {words_of_mode(judged.mode)}: it does not move "
+            f"the block is locked in its mode, {words_of_mode(at_rest.mode)}: it does not move "
             "under any horizontal acceleration"
         )
-    if judged.state == "unstable" or k <= 0.0:
-        name = {"topple": "k_r", "slide": "k_y", "slump": "k_s"}.get(judged.mode, "k_ct")
+    if at_rest.state == "unstable" or k <= 0.0:
+        name = {"topple": "k_r", "slide": "k_y", "slump": "k_s"}.get(at_rest.mode, "k_ct")
         raise InputError(
-            f"the block is {judged.state} at rest (mode {words_of_mode(judged.mode)}, {name} = "
+            f"the block is {at_rest.state} at rest (mode {words_of_mode(at_rest.mode)}, {name} = "
             f"{k:.4g} g)"
         )
 
@@ -483,3 +463,52 @@ def require_stable(judged: Stability) -> None:
 def rough_deg(block: Block) -> float:
     """Return a friction angle [deg] at which a block topples rather than slides."""
     return 0.5 * (block.alpha3_deg + 90.0)
+
+
+def after_first_slip(
+    block: Block, planes: Mapping[str, Any]
+) -> tuple[dict[str, Any], tuple[Diagnostic, ...]]:
+    """Return the planes after the first slip, and the warnings about them.
+
+    Args:
+        planes: keywords of `stability`, and perhaps ``phi_residual_deg``, else left as they are.
+
+    Raises:
+        InputError: no earthquake decides about the block, or it does not stand on what is left.
+    """
+    keywords = dict(planes)
+    residual_deg = keywords.pop("phi_residual_deg", None)
+    if residual_deg is None:
+        return keywords, ()
+    first = stability(block, **keywords)
+    require_stable(first)
+    remaining = {name: value for name, value in keywords.items() if name not in joints.ENDED}
+    remaining["phi_deg"] = residual_deg
+    if stability(block, **remaining).yield_acceleration <= 0.0:
+        finding = {"k": first.yield_acceleration, "mode": words_of_mode(first.mode)}
+        raise InputError(joints.SLIPS_ON.format(**finding), fields=("phi_residual_deg",))
+    return remaining, (joints.AFTER_SLIP,)
+
+
+def reject_before_slip(block: Block, planes: Mapping[str, Any], kind: str | None) -> None:
+    """Reject a simulation in time with contributions that end at the first slip.
+
+    Args:
+        planes: keywords of `stability`.
+        kind: kind of the block; None for that of its mode.
+
+    Raises:
+        InputError: a base that it slips on is rough.
+    """
+    if not planes.get("jrc"):
+        return
+    at_rest = stability(block, **planes)
+    backed = planes.get("back_fracture", True)
+    facts = facts_of(kind) if kind else kind_of_mode(at_rest.mode, back_fracture=backed)
+    if joints.slips_on_base(facts):
+        finding = {
+            "k": at_rest.yield_acceleration,
+            "mode": words_of_mode(at_rest.mode),
+        }
+        text = joints.ROUGH.format(kind=facts.kind, **finding)
+        raise InputError(text, fields=("jrc", "phi_residual_deg"))

@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 
 from rbfrag.db.engine import opened_database
 from rbfrag.errors import FitError, InputError
-from rbfrag.fragility.fit import critical
-from rbfrag.fragility.fit.critical import censored_rows, most_likely
+from rbfrag.fragility.fit import maximum_likelihood
 from rbfrag.fragility.fit.data import FitSource, fit_data
 from rbfrag.fragility.fit.fitting import fit, fit_source
+from rbfrag.fragility.fit.maximum_likelihood import censored_rows, most_likely
 from rbfrag.fragility.fit.report import FitReport
 from rbfrag.fragility.measures import TERMS
 from rbfrag.fragility.methods import method_named, methods
@@ -25,12 +25,12 @@ from tests.fragility.outcome_draws import TRUTH, drawn_outcomes
 
 @pytest.fixture(autouse=True)
 def few_replicates(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(critical, "REPLICATES", 40)
+    monkeypatch.setattr(maximum_likelihood, "REPLICATES", 40)
 
 
 @pytest.mark.parametrize(("kind", "term"), sorted(TRUE))
 def test_a_fit_finds_the_parameters_that_made_the_data(kind: str, term: str) -> None:
-    report = fit(drawn(kind, term), kind=kind, term=term)
+    report = fit(drawn(kind, term), kind=kind, term=term, bootstrap=True)
     for (name, value), true in zip(report.coefficients.items(), TRUE[kind, term], strict=True):
         assert value == pytest.approx(true, abs=4.0 * report.standard_errors[name])
         assert report.standard_errors[name] < 0.2

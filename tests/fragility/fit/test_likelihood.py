@@ -6,21 +6,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import minimize
 
-from rbfrag.fragility.fit.clusters import cr3, jackknife_steps, sandwich
-from rbfrag.fragility.fit.likelihood import (
-    Binomial,
-    fit_by_statsmodels,
-    maximise,
-    most_likely,
-)
+from rbfrag.fragility.fit.likelihood import Binomial, fit_by_statsmodels, maximise, most_likely
+from rbfrag.fragility.fit.result import cr3, jackknife_steps, sandwich
 from rbfrag.fragility.method import LOGIT, LOGLOG, arrays
 
 ALL = [LOGIT, LOGLOG]
 
 
-def drawn(link, seed=1, events=20, each=30):
+def drawn(link, seed=1, events=20, per_event=30):
     random = np.random.default_rng(seed)
-    event = np.repeat(np.arange(events), each)
+    event = np.repeat(np.arange(events), per_event)
     x = np.column_stack([np.ones(event.size), random.uniform(0.0, 1.0, (event.size, 2))])
     eta = x @ [0.3, 1.1, 0.5] + (0.3 * random.normal(size=events)[event] if link is LOGIT else 0.0)
     outcome = (random.random(event.size) < link.probability(eta, arrays())).astype(float)
@@ -65,11 +60,11 @@ def observed_information(b, data, link, step=1e-4):
 def test_estimates_and_errors_equal_an_independent_computation(link):
     data = drawn(link)
     b, covariance, naive = fit_by_statsmodels(data)
-    free = minimize(loss, b * 1.01, args=(data, link), method="Nelder-Mead",
+    minimum = minimize(loss, b * 1.01, args=(data, link), method="Nelder-Mead",
                     options={"xatol": 1e-12, "fatol": 1e-14, "maxiter": 20000})  # fmt: skip
-    assert b == pytest.approx(free.x, rel=2e-7)
-    own = most_likely(data)
-    assert own == pytest.approx(b, rel=1e-8 if link is LOGIT else 2e-6)
+    assert b == pytest.approx(minimum.x, rel=2e-7)
+    fitted_values = most_likely(data)
+    assert fitted_values == pytest.approx(b, rel=1e-8 if link is LOGIT else 2e-6)
     scores = numeric_scores(b, data, link)
     assert np.abs(scores.sum(axis=0)).max() < 1e-5 * np.abs(scores).sum()
     bread = np.linalg.inv(observed_information(b, data, link))
@@ -93,8 +88,8 @@ def test_clustered_errors_of_the_logit_in_matrices_to_eight_digits():
     residual = w * (data.outcome - p)
     meat = np.zeros((3, 3))
     for event in range(20):
-        own = data.event == event
-        score = x[own].T @ residual[own]
+        in_event = data.event == event
+        score = x[in_event].T @ residual[in_event]
         meat += np.outer(score, score)
     expected = bread @ meat @ bread * 20 / 19 * 599 / 597
     assert np.abs(covariance / expected - 1).max() < 1e-8
@@ -105,7 +100,7 @@ def test_clustered_errors_of_the_logit_in_matrices_to_eight_digits():
 
 @pytest.mark.parametrize("link", ALL, ids=lambda link: link.name)
 def test_the_jackknife_is_that_of_left_out_earthquakes(link):
-    data = drawn(link, events=30, each=60)
+    data = drawn(link, events=30, per_event=60)
     b = most_likely(data)
     steps = np.array([maximise(data.only(data.event != e), b)[0] - b for e in range(30)])
     expected = 29 / 30 * steps.T @ steps

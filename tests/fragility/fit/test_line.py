@@ -39,8 +39,8 @@ def test_clustered_covariance_equals_the_sandwich(points):
     residuals = y - design @ beta
     meat = np.zeros((2, 2))
     for event in np.unique(events):
-        own = events == event
-        score = design[own].T @ (weights[own] * residuals[own])
+        in_event = events == event
+        score = design[in_event].T @ (weights[in_event] * residuals[in_event])
         meat += np.outer(score, score)
     n, groups = x.size, np.unique(events).size
     sandwich = bread @ meat @ bread * groups / (groups - 1) * (n - 1) / (n - 2)
@@ -77,9 +77,9 @@ def test_a_start_elsewhere_ends_at_the_same_fit(points):
 
 def test_leaving_points_out_equals_zero_weight(points):
     x, y, _, events = points
-    kept = (events != 3).astype(float)
-    assert weighted_line(x, y, kept) == pytest.approx(
-        weighted_line(x[kept > 0], y[kept > 0], np.ones(int(kept.sum()))), rel=1e-12
+    weight = (events != 3).astype(float)
+    assert weighted_line(x, y, weight) == pytest.approx(
+        weighted_line(x[weight > 0], y[weight > 0], np.ones(int(weight.sum()))), rel=1e-12
     )
 
 
@@ -91,9 +91,9 @@ def test_bootstrap_repeats_with_its_seed_and_sees_clusters():
     shared = 0.7 * x + sigma * (
         0.9 * random.normal(size=30)[events] + 0.44 * random.normal(size=600)
     )
-    own = 0.7 * x + sigma * random.normal(size=600)
+    response = 0.7 * x + sigma * random.normal(size=600)
     spreads = []
-    for y in (shared, own):
+    for y in (shared, response):
         bins = Bins.equal_count(x[order])
         fit = iterate(bins, y[order], np.ones(600), 1)
         draws = [
@@ -124,6 +124,19 @@ def test_bins_hold_equal_counts():
     assert counts.sum() == 1003
     assert counts.max() - counts.min() <= 1
     assert Bins.equal_count(np.linspace(0.0, 1.0, 12)).starts.size == 4
+
+
+def test_bins_part_no_equal_intensities():
+    random = np.random.default_rng(3)
+    for _ in range(300):
+        x = np.sort(random.integers(random.integers(2, 60), size=random.integers(6, 600)) / 8.0)
+        starts = Bins.equal_count(x).starts
+        assert starts[0] == 0
+        assert np.all(np.diff(starts) > 0)
+        assert np.all(x[starts[1:]] > x[starts[1:] - 1])
+    x = np.repeat([1.0, 2.0, 3.0, 4.0, 5.0], [15, 10, 20, 30, 5])
+    # the quotas of four bins of eighty points end at 20, 40 and 60
+    assert Bins.equal_count(x).starts.tolist() == [0, 25, 45, 75]
 
 
 @pytest.mark.parametrize("truth", [(1e-4, 2e-3), (1e-4, 1e-3, 2e-2)])

@@ -1,4 +1,4 @@
-"""Which method a fit takes where none is named."""
+"""The method of a fit where none is named."""
 
 from __future__ import annotations
 

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import shutil
+import sqlite3
+from contextlib import closing
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +12,7 @@ import pytest
 
 import rbfrag
 from rbfrag.db.engine import opened_database
-from rbfrag.db.location import REFERENCE
+from rbfrag.db.location import REFERENCE, SCHEMA_REVISION, VERSION_TABLE
 from rbfrag.errors import SchemaVersionError
 from rbfrag.fragility.fit import fitting
 from rbfrag.fragility.fit.fitting import fit as fit_only
@@ -18,6 +20,7 @@ from rbfrag.fragility.fit.stored import NOT_STORED
 from rbfrag.fragility.model import SYNTHETIC
 from rbfrag.motions.sample_motions import demo_motions
 from tests.cli.conftest import Shell, shell
+from tests.fragility.portfolio_draws import SHARED
 from tests.synthetic import write_suite
 
 __all__ = ["shell"]
@@ -48,8 +51,47 @@ def test_python_and_shell_store_the_same(shell: Shell, tmp_path: Path) -> None:
         with pytest.raises(rbfrag.InputError, match="give a path or URL"):
             rbfrag.fit(connection, term="pgv")  # type: ignore[arg-type]
         fit_only(connection, term="pga_tm")
-    stored = [each["name"] for each in shell.json("models", "list", "--db", "a.db")]
+    stored = [row["name"] for row in shell.json("models", "list", "--db", "a.db")]
     assert stored == sorted(["other", report.name])
+
+
+def test_the_first_joint_question_estimates_the_dependence_and_stores_it(
+    shell: Shell, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    estimated: list[int] = []
+
+    def estimate(*, seed: int, **_: object) -> dict[str, object]:
+        estimated.append(seed)
+        return dict(SHARED)
+
+    monkeypatch.setattr(fitting, "estimate_dependence", estimate)
+    monkeypatch.setattr(fitting, "observed_blocks", lambda *_: {})
+    rbfrag.add_motions([write_suite(tmp_path / "records")], db="a.db")
+    rbfrag.simulate(db="a.db", p2=[10.0, 1.0], jobs=1)
+    report = rbfrag.fit(db="a.db", term="pgv", seed=3)
+    assert report.as_dict()["dependence"] is None
+    block = {"p2": 3.0, "kr": 0.1, "pgv_m_s": 0.3}
+    alone = rbfrag.predict(**block, db="a.db")
+    assert estimated == []
+    joint = rbfrag.predict(**block, db="a.db", sites=5)
+    assert (joint.probability, joint.ci_low) == (alone.probability, alone.ci_low)
+    assert joint.event_low is not None
+    assert joint.event_low < joint.probability
+    assert rbfrag.predict(**block, db="a.db", sites=5).event_low == joint.event_low
+    assert estimated == [3]
+    shown = shell.json("models", "show", report.name, "--db", "a.db")
+    assert shown["dependence"] == SHARED
+    assert shown["is_default"] is report.as_dict()["is_default"]
+    shell("db", "check", "--db", "a.db")
+    # of a database that cannot be written the answer says what to run
+    shutil.copy("a.db", "b.db")
+    rbfrag.fit(db="b.db", term="pgv", replace=True)
+    monkeypatch.setattr("rbfrag.db.engine.REFERENCE", tmp_path / "b.db")
+    read_only = rbfrag.predict(**block, db="b.db", sites=5)
+    assert read_only.event_low is None
+    assert any("fit it again with dependence" in text for text in read_only.warnings)
+    assert rbfrag.fit(db="a.db", term="pgv", name="all", dependence=True).as_dict()["dependence"]
+    assert estimated == [3, 0]
 
 
 def test_the_built_in_data_are_fitted_where_there_is_no_database(
@@ -65,20 +107,22 @@ def test_the_built_in_data_are_fitted_where_there_is_no_database(
     assert report.coefficients == stored.coefficients
     assert NOT_STORED not in stored.warnings
     (tmp_path / "built-in.db").write_bytes(before)
-    said = shell("fit", "--term", "pgv", "--method", "wls")
-    assert "Model     wls-pgv (" in said.stdout
-    assert "the model is not stored" in said.stdout
+    messageut = shell("fit", "--term", "pgv", "--method", "wls")
+    assert "Model     wls-pgv (" in messageut.stdout
+    assert "the model is not stored" in messageut.stdout
     assert not Path("rbfrag.db").exists()
     assert (tmp_path / "built-in.db").read_bytes() == before
     assert rbfrag.read_table("motion").equals(rbfrag.read_table("motion", db="built-in.db"))
-    said = shell("models", "default", "wls-pgv", expect=2).stderr
-    assert "the built-in data set is read-only: use --model wls-pgv" in said
+    messageut = shell("models", "default", "wls-pgv", expect=2).stderr
+    assert "the built-in data set is read-only: use --model wls-pgv" in messageut
 
 
 def test_schema_and_name_are_checked_before_anything_is_computed(
     shell: Shell, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    shutil.copy(REFERENCE, "older.db")
+    shutil.copy(REFERENCE, "newer.db")
+    with closing(sqlite3.connect("newer.db")) as connection, connection:
+        connection.execute(f"UPDATE {VERSION_TABLE} SET version_num = '9999'")
     rbfrag.add_motions([write_suite(tmp_path / "records")], db="own.db")
     rbfrag.simulate(db="own.db", p2=[10.0, 1.0], jobs=1)
     rbfrag.fit("own.db", term="pgv", method="wls")
@@ -87,8 +131,8 @@ def test_schema_and_name_are_checked_before_anything_is_computed(
         raise AssertionError("the data were read")
 
     monkeypatch.setattr(fitting, "read_source", read_source)
-    with pytest.raises(SchemaVersionError, match="has schema 0008, this rbfrag requires 0009"):
-        rbfrag.fit("older.db", term="pgv")
+    with pytest.raises(SchemaVersionError, match=f"has schema 9999, newer than {SCHEMA_REVISION}"):
+        rbfrag.fit("newer.db", term="pgv")
     with pytest.raises(rbfrag.InputError, match="the model 'wls-pgv' exists"):
         rbfrag.fit("own.db", term="pgv", method="wls")
     with pytest.raises(AssertionError, match="the data were read"):
@@ -102,8 +146,8 @@ def test_a_model_of_synthetic_pulses_says_so_in_every_answer(
     files, _ = demo_motions(tmp_path)
     assert rbfrag.add_motions(files, db="pulses.db").warnings == ()
     rbfrag.simulate(db="pulses.db", p2=[3.0], jobs=1)
-    said = shell("fit", "--term", "pgv", "--method", "logistic", "--db", "pulses.db").stdout
-    assert "of 12 synthetic pulses, which are not earthquakes" in said
+    output = shell("fit", "--term", "pgv", "--method", "logistic", "--db", "pulses.db").stdout
+    assert "of 12 synthetic pulses, which are not earthquakes" in output
     single = rbfrag.predict(3.0, 0.1, pgv_m_s=0.6, db="pulses.db")
     assert SYNTHETIC in single.warnings
     many = rbfrag.predict(np.array([3.0, 1.0]), np.array([0.1, 0.2]), pgv_m_s=0.6, db="pulses.db")

@@ -1,4 +1,4 @@
-"""What blocks did in five earthquakes, and the answers of models that have not seen them.
+"""Outcomes of blocks in five earthquakes, and the answers of models fitted without them.
 
 The tables beside this file are written by `python -m benchmarks.held_out_rows`.
 """
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from rbfrag.db.model_file import ModelRow
 from rbfrag.fragility.fit.likelihood import Binomial, most_likely
-from rbfrag.fragility.fit.scores import CLIP
+from rbfrag.fragility.fit.result import CLIP
 from rbfrag.fragility.method import LOGIT
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.fragility.prediction import answer_given
@@ -48,8 +48,8 @@ def probabilities(stored: dict[str, Any], sharpened: float = 1.0) -> FloatArray:
     model = FragilityModel.from_row(row)
     block = model.method.block
     names = (*block.names, *block.stored, *model.term.inputs)
-    given = {name: blocks(stored["kind"])[name] for name in names}
-    answer = answer_given(model, given, 0.95, interval=False)
+    arguments = {name: blocks(stored["kind"])[name] for name in names}
+    answer = answer_given(model, arguments, 0.95, interval=False)
     assert isinstance(answer, PredictionArray)
     return answer.probability
 

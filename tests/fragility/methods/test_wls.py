@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from rbfrag.fragility.method import SINGLE
-from rbfrag.fragility.methods.wls import METHOD
-from rbfrag.fragility.straight_line import (
+from rbfrag.fragility.methods.wls import (
+    METHOD,
     mean_m_s,
     negative_probability,
     rise,
@@ -14,8 +14,8 @@ from rbfrag.fragility.straight_line import (
 
 
 def score(parameters, x, y):
-    found = METHOD.forms["pgv"].eta(parameters, {"intensity_m_s": x, "y_m_s": y}, SINGLE)
-    return found.eta, found.slopes
+    result = METHOD.forms["pgv"].eta(parameters, {"intensity_m_s": x, "y_m_s": y}, SINGLE)
+    return result.eta, result.slopes
 
 
 CASES = [(0.002, 0.72, 4e-5, 3e-3), (-0.01, 0.6, 1e-4, 1e-3, 2e-2), (0.02, 0.5, 1e-3, 0.0, 0.04)]

@@ -47,10 +47,10 @@ DESKTOP = {"width": 1366, "height": 900}
 @pytest.fixture(scope="session")
 def chromium() -> str:
     """The browser's program."""
-    found = next((path for name in NAMES if (path := shutil.which(name))), None)
-    if found is None:
+    result = next((path for name in NAMES if (path := shutil.which(name))), None)
+    if result is None:
         missing("no Chromium to open the page in: install the package chromium")
-    return str(found)
+    return str(result)
 
 
 # Not for the session: while a player is there its event loop runs, and no other test may have one.
@@ -68,16 +68,16 @@ def service(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
     """Address of a service in a process of its own, on a copy of the shipped models."""
     folder = tmp_path_factory.mktemp("service")
     database = shutil.copyfile(REFERENCE, folder / "models.db")
-    with socket.socket() as free:
-        free.bind(("127.0.0.1", 0))
-        port = free.getsockname()[1]
-    told = json.dumps({"db": str(database), "port": port})
+    with socket.socket() as free_standing:
+        free_standing.bind(("127.0.0.1", 0))
+        port = free_standing.getsockname()[1]
+    document = json.dumps({"db": str(database), "port": port})
     root = Path(__file__).resolve().parents[3]
     with (folder / "log.txt").open("wb") as log:
         process = subprocess.Popen(
             [sys.executable, "-m", "rbfrag.service"],
             cwd=root,
-            env={**os.environ, "RBFRAG_SERVICE": told},
+            env={**os.environ, "RBFRAG_SERVICE": document},
             stdout=log,
             stderr=log,
         )
@@ -161,7 +161,9 @@ def open_page(browser: Browser, service: str) -> Iterator[Callable[..., Opened]]
         opened.page.on("pageerror", lambda error: opened.complaints.append(str(error)))
         opened.page.on(
             "console",
-            lambda said: said.type in ("error", "warning") and opened.complaints.append(said.text),
+            lambda message: (
+                message.type in ("error", "warning") and opened.complaints.append(message.text)
+            ),
         )
         opened.page.goto(service + query)
         if settle:

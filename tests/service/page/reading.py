@@ -1,4 +1,4 @@
-"""What the page shows, read back into numbers."""
+"""Text of the page, read back into numbers."""
 
 from __future__ import annotations
 
@@ -25,12 +25,12 @@ def probability_shown(page: Page) -> str:
 
 
 def agrees(shown: str, probability: float) -> bool:
-    """Whether a probability in percent is what a page shows, to the digits that it shows."""
+    """Return whether a page shows this probability in percent, to the digits that it shows."""
     if shown in ("0", "1"):  # by mechanics
         return probability == float(shown)
-    found = PERCENT.fullmatch(shown)
-    assert found, shown
-    sign, digits = found.groups()
+    result = PERCENT.fullmatch(shown)
+    assert result, shown
+    sign, digits = result.groups()
     value = float(digits) / 100.0
     if sign == "<":
         return 0.0 < probability < value
@@ -55,14 +55,14 @@ class Plane:
     y: tuple[float, float]
 
     def value(self, px: float, py: float) -> tuple[float, float]:
-        left, top, width, height = self.box
-        across, up = (px - left) / width, 1.0 - (py - top) / height
+        remaining, top, width, height = self.box
+        across, up = (px - remaining) / width, 1.0 - (py - top) / height
         return _between(self.x, across), _between(self.y, up)
 
     def place(self, x: float, y: float) -> tuple[float, float]:
-        left, top, width, height = self.box
+        remaining, top, width, height = self.box
         return (
-            left + width * _share(self.x, x),
+            remaining + width * _share(self.x, x),
             top + height * (1.0 - _share(self.y, y)),
         )
 

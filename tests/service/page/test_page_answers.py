@@ -1,4 +1,4 @@
-"""What is typed is answered: by the service's numbers, in its words, the newest question last."""
+"""Answers to typed inputs: the service's numbers and words, the newest question last."""
 
 import re
 
@@ -20,7 +20,7 @@ REJECTED = "Failed to load resource: the server responded with a status of 422"
 def forgive(opened, words):
     """Take back the browser's complaints about answers that the test provoked."""
     assert opened.complaints
-    assert all(words in each for each in opened.complaints)
+    assert all(words in complaint for complaint in opened.complaints)
     opened.complaints.clear()
 
 
@@ -46,8 +46,8 @@ def test_the_answer_is_the_services(open_page, ask, typed):
             page.locator(f"#{part} summary").click()
     for name, text in typed.items():
         page.fill(f"#{name}", text)
-    asked = {"p2": "3", "kr": "0.1", "pgv": "0.6", **typed}
-    answer = ask("v1/predict", **{name: text for name, text in asked.items() if text})
+    inputs = {"p2": "3", "kr": "0.1", "pgv": "0.6", **typed}
+    answer = ask("v1/predict", **{name: text for name, text in inputs.items() if text})
     opened.settled()
     assert agrees(probability_shown(page), answer["probability"])
     if answer["how"] != "by mechanics":
@@ -294,13 +294,13 @@ def test_blocks_that_slide_or_slump_have_answers(open_page, ask, shape, kind, ti
     expect(page.locator("#answer-title")).to_contain_text(title)
     expect(page.locator("#chart")).to_be_hidden()
     assert numbers in opened.text("#lines")
-    left, top, width, height = page.eval_on_selector(
+    remaining, top, width, height = page.eval_on_selector(
         "#curve .area",
         "a => ['x', 'y', 'width', 'height'].map((name) => Number(a.getAttribute(name)))",
     )
     points = points_of(page.get_attribute("#curve .curve", "d"))
-    for px, py in [each for each in points if left <= each[0] <= left + width][10::30]:
-        there = ask("v1/predict", **shape, **kind, pgv=0.05 * 60.0 ** ((px - left) / width))
+    for px, py in [point for point in points if remaining <= point[0] <= remaining + width][10::30]:
+        there = ask("v1/predict", **shape, **kind, pgv=0.05 * 60.0 ** ((px - remaining) / width))
         assert 1.0 - (py - top) / height == pytest.approx(there["probability"], abs=3e-3)
     if kind["kind"] == "sliding":
         page.fill("#displacement", "0.5")
@@ -326,9 +326,9 @@ def test_what_may_be_thousands_is_rejected(open_page, typed):
     opened = open_page()
     page = opened.page
     page.fill("#pgv", typed)
-    said = page.locator("#pgv-error")
-    expect(said).to_have_text(re.compile("use a decimal point and no thousands separator"))
-    assert typed in said.text_content()
+    message = page.locator("#pgv-error")
+    expect(message).to_have_text(re.compile("use a decimal point and no thousands separator"))
+    assert typed in message.text_content()
     expect(page.locator("#probability")).to_have_attribute("data-state", "none")
     page.fill("#pgv", "0.6")
     opened.settled()
@@ -424,7 +424,7 @@ def test_half_of_a_number_is_not_asked(open_page):
         page.keyboard.press(key)
         page.wait_for_timeout(400)
     opened.settled()
-    assert not any("kr=0&" in each or "kr=0.&" in each for each in opened.requests)
+    assert not any("kr=0&" in request or "kr=0.&" in request for request in opened.requests)
     assert page.locator("#kr-error").text_content() == ""
     page.focus("#pgv")
     page.keyboard.press("Control+a")
@@ -432,7 +432,7 @@ def test_half_of_a_number_is_not_asked(open_page):
         page.keyboard.press(key)
         page.wait_for_timeout(400)
     opened.settled()
-    assert not any("pgv=." in each and "pgv=.6" not in each for each in opened.requests)
+    assert not any("pgv=." in request and "pgv=.6" not in request for request in opened.requests)
     page.focus("#kr")
     page.keyboard.press("Control+a")
     page.keyboard.press("0")

@@ -12,9 +12,9 @@ PHONE = {"viewport": {"width": 390, "height": 844}, "has_touch": True, "is_mobil
 
 
 def check(page):
-    found = AXE.run(page)
-    assert len(found.response["passes"]) > 20
-    assert found.violations_count == 0, found.generate_report()
+    result = AXE.run(page)
+    assert len(result.response["passes"]) > 20
+    assert result.violations_count == 0, result.generate_report()
 
 
 STATES = {

@@ -27,9 +27,9 @@ def kr_at(y_m_s, p2=3.0):
     return y_m_s * p2**0.5 / 9.80665
 
 
-@pytest.mark.parametrize("others", [{}, {"pga": 0.5, "tm": 0.5}], ids=["pgv", "pgv_pga_tm"])
-def test_on_each_line_the_service_gives_the_lines_probability(open_page, ask, others):
-    question = {"p2": 3, "kr": 0.1, "pgv": 0.6, **others}
+@pytest.mark.parametrize("rest", [{}, {"pga": 0.5, "tm": 0.5}], ids=["pgv", "pgv_pga_tm"])
+def test_on_each_line_the_service_gives_the_lines_probability(open_page, ask, rest):
+    question = {"p2": 3, "kr": 0.1, "pgv": 0.6, **rest}
     page = open_page("?" + "&".join(f"{name}={value}" for name, value in question.items())).page
     model = ask("v1/predict", **question)["model"]
     plane = plane_of(page)
@@ -37,7 +37,7 @@ def test_on_each_line_the_service_gives_the_lines_probability(open_page, ask, ot
         "#chart .line", "all => all.map((path) => path.getAttribute('d'))"
     )
     levels = (0.01, 0.05, 0.1, 0.25, 0.5, 0.75, 0.9, 0.95, 0.99)
-    asked = 0
+    inputs = 0
     for level, path in zip(levels, paths, strict=True):
         points = [
             (px, py)
@@ -46,22 +46,22 @@ def test_on_each_line_the_service_gives_the_lines_probability(open_page, ask, ot
         ]
         for px, py in points[:: max(len(points) // 4, 1)]:
             above, below = (
-                ask("v1/predict", p2=3, kr=kr_at(y), pgv=x, model=model, **others)["probability"]
+                ask("v1/predict", p2=3, kr=kr_at(y), pgv=x, model=model, **rest)["probability"]
                 for x, y in (plane.value(px, py - PIXELS), plane.value(px, py + PIXELS))
             )
             assert above <= level <= below
-            asked += 1
-    assert asked > 20
+            inputs += 1
+    assert inputs > 20
 
 
 def test_what_is_hatched_begins_where_the_fitted_range_ends(open_page, ask):
     page = open_page().page
     plane = plane_of(page)
-    left, top, width, height = plane.box
+    remaining, top, width, height = plane.box
     edge = [
         plane.value(px, py)
         for px, py in points_of(page.get_attribute("#chart .outside", "d"))
-        if left + 2 < px < left + width - 2 and top + 2 < py < top + height - 2
+        if remaining + 2 < px < remaining + width - 2 and top + 2 < py < top + height - 2
     ]
     assert len(edge) > 5
     # the edge is drawn between the nodes of a grid, whose neighbours differ by 7.6 %
@@ -121,8 +121,8 @@ def test_a_finger_moves_the_point(open_page):
     plane = plane_of(page)
     touch = page.context.new_cdp_session(page)
 
-    def send(kind, places):
-        points = [{"x": x, "y": y} for x, y in places]
+    def send(kind, positions):
+        points = [{"x": x, "y": y} for x, y in positions]
         touch.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": points})
 
     start, goal = on_screen(page, plane.place(0.6, 0.566)), on_screen(page, plane.place(1.0, 0.3))
@@ -171,10 +171,10 @@ def test_the_curve_is_the_services(open_page, ask):
         "#curve .area",
         "a => ['x', 'y', 'width', 'height'].map((name) => Number(a.getAttribute(name)))",
     )
-    left, top, width, height = box
-    points = [p for p in points_of(path) if left <= p[0] <= left + width]
+    remaining, top, width, height = box
+    points = [p for p in points_of(path) if remaining <= p[0] <= remaining + width]
     for px, py in points[::12]:
-        pgv = 0.05 * 60.0 ** ((px - left) / width)
+        pgv = 0.05 * 60.0 ** ((px - remaining) / width)
         shown = 1.0 - (py - top) / height
         answer = ask("v1/predict", p2=3, kr=0.1, pgv=pgv)
         assert shown == pytest.approx(answer["probability"], abs=2e-3)
@@ -186,18 +186,18 @@ def test_both_bands_of_the_curve_are_the_services(open_page, ask):
         "#curve .area",
         "a => ['x', 'y', 'width', 'height'].map((name) => Number(a.getAttribute(name)))",
     )
-    left, top, width, height = box
+    remaining, top, width, height = box
     for kind, ends, apart in (
         ("confidence", ("ci_low", "ci_high"), 3e-3),
         ("one-event", ("event_low", "event_high"), 8e-3),  # a block of 200 more or less
     ):
         outline = points_of(page.get_attribute(f"#curve .{kind}", "d"))
-        for px in sorted({p[0] for p in outline if left <= p[0] <= left + width})[5::25]:
+        for px in sorted({p[0] for p in outline if remaining <= p[0] <= remaining + width})[5::25]:
             edges = sorted(1.0 - (py - top) / height for x, py in outline if x == px)
-            pgv = 0.05 * 60.0 ** ((px - left) / width)
+            pgv = 0.05 * 60.0 ** ((px - remaining) / width)
             answer = ask("v1/predict", p2=3, kr=0.1, pgv=pgv, sites=50)
-            asked = [answer[name] for name in ends]
-            assert [edges[0], edges[-1]] == pytest.approx(asked, abs=apart)
+            command = [answer[name] for name in ends]
+            assert [edges[0], edges[-1]] == pytest.approx(command, abs=apart)
 
 
 def ticks(page, axis):

@@ -66,7 +66,8 @@ def test_the_link_is_copied(open_page):
 
 def test_a_block_without_a_back_plane_stands_free(open_page):
     shown = [
-        open_page(f"?p2=3&kr=0.2&pgv=0.6&{free}").page for free in ("no_back=true", "kind=rocking")
+        open_page(f"?p2=3&kr=0.2&pgv=0.6&{free_standing}").page
+        for free_standing in ("no_back=true", "kind=rocking")
     ]
     expect(shown[0].get_by_label("free-standing")).to_be_checked()
     assert shown[0].evaluate(SHOWN) == shown[1].evaluate(SHOWN)

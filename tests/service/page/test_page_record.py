@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 from playwright.sync_api import expect
 
-from rbfrag.motions.export import export_motions
 from rbfrag.motions.ground_motion import GroundMotion
+from rbfrag.motions.readers import export_motions
 from rbfrag.motions.toppling_spectrum import toppling_spectrum
 from tests.service.page.reading import points_of
 from tests.service.page.test_page_answers import forgive
@@ -40,12 +40,12 @@ def pulse(amplitude_g=0.4, duration_s=1.0):
 @pytest.fixture(scope="module", autouse=True)
 def compiled(service):
     """The processes that work on records compile their kernels before they take any."""
-    asked = urllib.request.Request(
+    inputs = urllib.request.Request(
         f"{service}v1/spectrum", pulse().encode(), {"Content-Type": "text/plain"}
     )
     for _ in range(10):
         try:
-            with urllib.request.urlopen(asked, timeout=300):
+            with urllib.request.urlopen(inputs, timeout=300):
                 return
         except urllib.error.HTTPError as busy:
             if busy.code != 503:
@@ -64,7 +64,7 @@ def curve(page, kind):
         "#spectrum .area",
         "a => ['x', 'y', 'width', 'height'].map((name) => Number(a.getAttribute(name)))",
     )
-    left, _, width, _ = frame
+    remaining, _, width, _ = frame
     texts = page.locator("#spectrum .axis").nth(2).locator(".tick")
     ticks = [
         (
@@ -76,7 +76,9 @@ def curve(page, kind):
     (v1, y1), (v2, y2) = ticks[0], ticks[-1]
     scale = math.log(v2 / v1) / (y2 - y1)
     path = points_of(page.get_attribute(f"#spectrum g[clip-path] .spectrum.{kind}", "d"))
-    return [(0.1 * 300.0 ** ((x - left) / width), v1 * math.exp((y - y1) * scale)) for x, y in path]
+    return [
+        (0.1 * 300.0 ** ((x - remaining) / width), v1 * math.exp((y - y1) * scale)) for x, y in path
+    ]
 
 
 def test_a_dropped_record_shows_its_spectrum(open_page, tmp_path):
@@ -187,7 +189,7 @@ def test_half_of_an_interval_is_not_asked(open_page):
     expect(page.locator("#spectrum-part")).to_be_visible()
     expect(page.locator("#dt-error")).to_have_text("")
     halves = ("dt=0&", "dt=0.&", "dt=0.0&")
-    assert not [each for each in opened.requests if any(half in each for half in halves)]
+    assert not [request for request in opened.requests if any(half in request for half in halves)]
     forgive(opened, "Failed to load resource")
 
 
@@ -290,17 +292,19 @@ def test_a_record_decides_the_headline(open_page, tmp_path):
     import rbfrag
 
     [motion] = rbfrag.read_motions(tmp_path / "pulse.csv")
-    found = {
-        each: rbfrag.critical(motion, p2=3.0, polarity=each).kr for each in ("forward", "reverse")
+    values = {
+        item: rbfrag.critical(motion, p2=3.0, polarity=item).kr for item in ("forward", "reverse")
     }
-    less, more = sorted(found, key=found.get)
-    assert found[less] < 0.95 * found[more]
-    for kr in (0.99 * found[less], 1.01 * found[less], 1.01 * found[more]):
+    less, more = sorted(values, key=values.get)
+    assert values[less] < 0.95 * values[more]
+    for kr in (0.99 * values[less], 1.01 * values[less], 1.01 * values[more]):
         page.fill("#kr", f"{kr:.5f}")
         expect(answers).to_have_text(
             [
-                re.compile(rf"{'topples' if kr < found[each] else 'does not topple'}: the critical")
-                for each in ("forward", "reverse")
+                re.compile(
+                    rf"{'topples' if kr < values[item] else 'does not topple'}: the critical"
+                )
+                for item in ("forward", "reverse")
             ]
         )
         expect(page.locator("#probability")).to_contain_text("%")

@@ -46,11 +46,11 @@ def test_each_row_comes_back_with_its_answer(open_page, dropped):
     )
     (slab, post, none), notes = downloaded(page)
     for row, height, width, dip in ((slab, 2.0, 0.4, 5.0), (post, 3.0, 0.3, 0.0)):
-        known = rbfrag.predict(
+        expected = rbfrag.predict(
             height_m=height, width_m=width, beta_deg=dip, pgv_m_s=0.8, db=REFERENCE
         )
-        assert float(row["probability"]) == pytest.approx(known.probability, rel=1e-9)
-        assert float(row["ci_low"]) == pytest.approx(known.ci_low, rel=1e-9)
+        assert float(row["probability"]) == pytest.approx(expected.probability, rel=1e-9)
+        assert float(row["ci_low"]) == pytest.approx(expected.ci_low, rel=1e-9)
     assert post["name"] == "'=post"
     assert none["probability"] == ""
     assert none["reason"]
@@ -61,7 +61,7 @@ def test_each_row_comes_back_with_its_answer(open_page, dropped):
 
 
 @pytest.mark.parametrize(
-    ("text", "said"),
+    ("text", "message"),
     [
         ("", "the table is empty"),
         ("height,width\n2,wide\n", "'wide' is not a number"),
@@ -69,11 +69,11 @@ def test_each_row_comes_back_with_its_answer(open_page, dropped):
         ("height,width,dip quality\n2,1,5\n", "'dip quality' is unknown"),
     ],
 )
-def test_a_table_that_cannot_be_read_is_rejected(open_page, text, said):
+def test_a_table_that_cannot_be_read_is_rejected(open_page, text, message):
     opened = open_page()
     page = opened.page
     page.fill("#table-text", text)
     page.click("#table-ask")
-    expect(page.locator("#table-error")).to_contain_text(said)
+    expect(page.locator("#table-error")).to_contain_text(message)
     expect(page.locator("#table-file")).to_be_hidden()
     opened.complaints.clear()  # the browser reports the rejected request

@@ -105,7 +105,7 @@ def test_text_stands_out_from_what_is_behind_it(open_page, query):
         page.emulate_media(color_scheme=scheme)
         contrasts = page.evaluate(CONTRASTS)
         assert len(contrasts) > 50
-        assert [each for each in contrasts if each[0] < 4.5] == []
+        assert [contrast for contrast in contrasts if contrast[0] < 4.5] == []
 
 
 def test_on_paper_are_the_answer_the_charts_and_the_link(open_page):
@@ -119,7 +119,7 @@ def test_on_paper_are_the_answer_the_charts_and_the_link(open_page):
         expect(page.locator(shown).first).to_be_visible()
     expect(page.locator("#paper-link")).to_have_text(page.url)
     assert page.evaluate("getComputedStyle(document.body).backgroundColor") == "rgb(255, 255, 255)"
-    assert [each for each in page.evaluate(CONTRASTS) if each[0] < 4.5] == []
+    assert [item for item in page.evaluate(CONTRASTS) if item[0] < 4.5] == []
     sheet = page.pdf(prefer_css_page_size=True)
     assert sheet.startswith(b"%PDF")
     assert len(re.findall(rb"/Type\s*/Page\b", sheet)) == 1
@@ -140,5 +140,5 @@ def test_nothing_is_asked_of_another_host(open_page, service):
     # What the document itself may load is held to the same by its headers.
     blocked = page.evaluate("fetch('http://127.0.0.2:9/').then(() => 'loaded', () => 'rejected')")
     assert blocked == "rejected"
-    assert any("Content Security Policy" in each for each in opened.complaints)
+    assert any("Content Security Policy" in complaint for complaint in opened.complaints)
     opened.complaints.clear()

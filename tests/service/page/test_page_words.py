@@ -1,4 +1,4 @@
-"""How the page writes numbers: never more, and never else, than the number itself."""
+"""Numbers on the page: never more, and never else, than the number itself."""
 
 from itertools import pairwise
 
@@ -80,5 +80,5 @@ def test_a_spectrum_survives_a_link(run):
         "verdict": {"p2": 3.0, "kr": 0.1, "texts": [["The block topples", "certified"]]},
     }
     [fragment] = run("record.js", "toFragment", [[spectrum]])
-    assert all(each.isascii() and (each.isalnum() or each in "=-_") for each in fragment)
+    assert all(item.isascii() and (item.isalnum() or item in "=-_") for item in fragment)
     assert run("record.js", "fromFragment", [[fragment]]) == [spectrum]

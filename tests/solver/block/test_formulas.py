@@ -30,16 +30,16 @@ def exact_tangent(angle_deg: float) -> Fraction:
 
 def angles() -> list[float]:
     random = np.random.default_rng(3)
-    some = [*random.uniform(-90.0, 90.0, 300), *10.0 ** random.uniform(-8.0, 1.9, 100)]
+    subset = [*random.uniform(-90.0, 90.0, 300), *10.0 ** random.uniform(-8.0, 1.9, 100)]
     edges = [0.0, 45.0, -45.0, 30.0, 60.0, 89.999999, -89.9, math.nextafter(45.0, 90.0)]
-    return [*map(float, some), *edges]
+    return [*map(float, subset), *edges]
 
 
 def test_tangent_is_right_to_rounding() -> None:
     for angle in angles():
         exact = exact_tangent(angle)
-        found = tan_deg(angle, SCALAR)
-        assert abs(Fraction(found) - exact) <= Fraction(3 * math.ulp(float(exact))), angle
+        result = tan_deg(angle, SCALAR)
+        assert abs(Fraction(result) - exact) <= Fraction(3 * math.ulp(float(exact))), angle
 
 
 def test_cotangent_is_right_to_rounding() -> None:
@@ -49,8 +49,8 @@ def test_cotangent_is_right_to_rounding() -> None:
             for sign, gamma in ((1, angle), (-1, 180.0 - angle)):
                 if gamma > 90.0 and 180.0 - gamma != angle:
                     continue
-                found = sign * Fraction(cot_deg(gamma, SCALAR))
-                assert abs(found - exact) <= Fraction(3 * math.ulp(float(exact))), gamma
+                result = sign * Fraction(cot_deg(gamma, SCALAR))
+                assert abs(result - exact) <= Fraction(3 * math.ulp(float(exact))), gamma
 
 
 def test_symmetry_is_exact() -> None:
@@ -61,10 +61,10 @@ def test_symmetry_is_exact() -> None:
 
 
 def test_arrays_have_the_same_bits() -> None:
-    given = np.array(angles())
+    inputs = np.array(angles())
     functions = array_elementwise()
-    assert tan_deg(given, functions).tolist() == [tan_deg(a, SCALAR) for a in given.tolist()]
-    gammas = np.abs(given) + 0.1
+    assert tan_deg(inputs, functions).tolist() == [tan_deg(a, SCALAR) for a in inputs.tolist()]
+    gammas = np.abs(inputs) + 0.1
     assert cot_deg(gammas, functions).tolist() == [cot_deg(g, SCALAR) for g in gammas.tolist()]
     with np.errstate(invalid="raise"):
         assert np.isnan(tan_deg(np.array([math.nan]), functions)).all()
@@ -72,5 +72,5 @@ def test_arrays_have_the_same_bits() -> None:
 
 @pytest.mark.parametrize("angle", [15.0, 36.0, 75.0])
 def test_known_tangents(angle: float) -> None:
-    known = {15.0: 2.0 - 3.0**0.5, 36.0: (5.0 - 2.0 * 5.0**0.5) ** 0.5, 75.0: 2.0 + 3.0**0.5}
-    assert tan_deg(angle, SCALAR) == pytest.approx(known[angle], rel=1e-15)
+    expected = {15.0: 2.0 - 3.0**0.5, 36.0: (5.0 - 2.0 * 5.0**0.5) ** 0.5, 75.0: 2.0 + 3.0**0.5}
+    assert tan_deg(angle, SCALAR) == pytest.approx(expected[angle], rel=1e-15)

@@ -26,12 +26,12 @@ def test_every_block_of_a_batch_has_the_numbers_of_its_single_run(with_vertical:
     for i in range(3):
         for j in range(23):
             alone = simulate(excited, p2=float(p2[i, 0]), kr=float(kr[j]))
-            here = (
+            local = (
                 runs.outcome[i, j], runs.peak_rad[i, j], runs.started_s[i, j],
                 runs.verdict_s[i, j], runs.steps[i, j], runs.samples_moved[i, j],
             )  # fmt: skip
-            *others, error, steps, samples = alone[:7]
-            np.testing.assert_array_equal(np.array(here), np.array([*others, steps, samples]))
+            *rest, error, steps, samples = alone[:7]
+            np.testing.assert_array_equal(np.array(local), np.array([*rest, steps, samples]))
             # two compilations may round the estimate in its last bit (numba 0.60 does)
             assert runs.error_rad[i, j] == pytest.approx(error, rel=1e-15, abs=0.0, nan_ok=True)
             outcomes.add(alone.outcome)

@@ -26,14 +26,14 @@ turn(0.1, 0.9, 0.01), at_rest(0.1)
 
 def test_the_first_compilation_is_announced_once_and_never_from_the_cache(tmp_path: Path) -> None:
     environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)}
-    said = [
+    message = [
         subprocess.run(
             [sys.executable, "-c", SCRIPT], env=environment, capture_output=True, text=True,
             check=True,
         ).stdout
         for _ in range(2)
     ]  # fmt: skip
-    assert said == ["compiles\n", ""]
+    assert message == ["compiles\n", ""]
 
 
 def test_machine_code_of_another_version_is_compiled_anew(tmp_path: Path) -> None:
@@ -44,8 +44,8 @@ def test_machine_code_of_another_version_is_compiled_anew(tmp_path: Path) -> Non
     # an index of this numba that names a class which is no longer there
     missing = b"cno_such_module\nNoSuchClass\n."
     index.write_bytes(pickle.dumps(numba.__version__) + missing)
-    said = subprocess.run(run, env=environment, capture_output=True, text=True, check=True)
-    assert said.stdout == "compiles\n"
+    message = subprocess.run(run, env=environment, capture_output=True, text=True, check=True)
+    assert message.stdout == "compiles\n"
 
 
 def test_a_change_in_any_file_of_the_solver_outdates_machine_code(tmp_path: Path) -> None:
@@ -55,31 +55,31 @@ def test_a_change_in_any_file_of_the_solver_outdates_machine_code(tmp_path: Path
         **os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "cache"), "PYTHONPATH": str(tmp_path)
     }  # fmt: skip
 
-    def said() -> str:
+    def run_output() -> str:
         return subprocess.run(
             [sys.executable, "-c", SCRIPT], env=environment, cwd=tmp_path, capture_output=True,
             text=True, check=True,
         ).stdout  # fmt: skip
 
-    assert [said(), said()] == ["compiles\n", ""]
+    assert [run_output(), run_output()] == ["compiles\n", ""]
     other = package / "solver" / "integrator" / "excursion.py"  # not where `turn` stands
     other.write_text(other.read_text() + "\n")
-    assert said() == "compiles\n"
+    assert run_output() == "compiles\n"
 
 
 @pytest.mark.parametrize("safe", [True, False, "another's"])
 def test_where_nothing_can_be_written_machine_code_is_kept_in_a_folder_of_the_users_own(
     tmp_path: Path, safe: bool | str
 ) -> None:
-    own = tmp_path / f"rbfrag-kernels-{os.getuid()}"
+    expected = tmp_path / f"rbfrag-kernels-{os.getuid()}"
     if not safe:  # others may write there, and what lies in it would be run
-        own.mkdir()
-        own.chmod(0o777)
+        expected.mkdir()
+        expected.chmod(0o777)
     if safe == "another's":
         if os.getuid() != 0:
             pytest.skip("only root can make a folder of another user")
-        own.mkdir(mode=0o700)
-        os.chown(own, 65534, 65534)
+        expected.mkdir(mode=0o700)
+        os.chown(expected, 65534, 65534)
     environment = {
         **os.environ, "TMPDIR": str(tmp_path), "NUMBA_CACHE_DIR": "",
         # neither beside the package nor in a home
@@ -96,13 +96,13 @@ def test_where_nothing_can_be_written_machine_code_is_kept_in_a_folder_of_the_us
         for _ in range(2)
     )  # fmt: skip
     if safe is True:
-        assert first == f"compiles\nonce; they are kept in {own}\n"
+        assert first == f"compiles\nonce; they are kept in {expected}\n"
         assert second == first.removeprefix("compiles\n")
-        assert own.stat().st_mode & 0o077 == 0
+        assert expected.stat().st_mode & 0o077 == 0
     else:
         assert first == second
         assert first.startswith("compiles\nat each start: no folder")
-        assert not list(own.iterdir())
+        assert not list(expected.iterdir())
 
 
 @inner_kernel

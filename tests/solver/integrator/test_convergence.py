@@ -31,8 +31,8 @@ def problems() -> list[Problem]:
     every other coefficient vanishes): hence the root mean square over many.
     """
     rng = np.random.default_rng(0)
-    found: list[Problem] = []
-    while len(found) < 24:
+    values: list[Problem] = []
+    while len(values) < 24:
         kr = rng.uniform(0.1, 0.5)
         pull = GroundMotion.from_nodes(
             [0.0, 0.0, END_S], [0.0, kr + rng.uniform(0.1, 0.6), rng.uniform(-0.6, 0.2)]
@@ -44,8 +44,8 @@ def problems() -> list[Problem]:
         rising = np.interp(END_S, run.history.time_s, run.history.theta_dot_rad_s)
         if rising > 0.02:
             excited = excitation(pull, lift)
-            found.append((excited, kr, truth(excited, p2=1.0, kr=kr)))
-    return found
+            values.append((excited, kr, truth(excited, p2=1.0, kr=kr)))
+    return values
 
 
 def error(problems: list[Problem], order: int, steps: int) -> float:

@@ -75,7 +75,7 @@ def brake_to_the_base() -> float:
     "off", [0.0, *(sign * 10.0**-n for n in (2, 5, 8, 11, 13, 15) for sign in (-1.0, 1.0))]
 )
 def test_grazing_the_base(off: float) -> None:
-    """Whether the block touches or turns just above makes no difference to what follows.
+    """A block that touches and one that turns just above move alike afterwards.
 
     To turn at theta = 0 it needs q > k_r there, so that a touch have impacts it with next to no
     speed and lifts it again at once: from (0, ~0) either way. But the speed that a touch takes
@@ -242,11 +242,11 @@ def test_last_sample_that_is_not_zero(p2: float) -> None:
             assert written_out.peak_theta_rad == pytest.approx(run.peak_theta_rad, rel=1e-10)
 
 
-@pytest.mark.parametrize("left", [0.1, 1e-3, 1e-6, 1e-12])
-def test_gravity_nearly_taken_away(left: float) -> None:
+@pytest.mark.parametrize("remaining", [0.1, 1e-3, 1e-6, 1e-12])
+def test_gravity_nearly_taken_away(remaining: float) -> None:
     """1 + k_v > 0 is the model, however little is left; q runs up to k_h/(1 + k_v)."""
     motion = GroundMotion.from_nodes([0.0, 0.5, 1.0, 2.0], [0.0, 0.05, -0.3, 0.0])
-    vertical = GroundMotion.from_nodes([0.0, 0.5, 1.0, 2.0], [0.0, left - 1.0, 0.0, 0.0])
+    vertical = GroundMotion.from_nodes([0.0, 0.5, 1.0, 2.0], [0.0, remaining - 1.0, 0.0, 0.0])
     for kr in (0.3, 2.0):
         judged(motion, 2.0, kr, vertical, rel=1e-8)
     result = critical(motion, p2=2.0, vertical=vertical)
@@ -277,8 +277,10 @@ def test_intervals_of_no_length(seed: int) -> None:
     doubled = GroundMotion.from_nodes(np.repeat(times, 3), np.repeat(values, 3))
     steps = GroundMotion.from_nodes(np.repeat(times, 2)[1:-1], np.repeat(values[:-1], 2))
     for p2, kr in ((20.0, 0.2), (2.0, 0.35)):
-        one, other = (respond(m, p2=p2, kr=kr) for m in (plain, doubled))
-        assert (one.outcome, one.peak_theta_rad, one.samples_moved, one.samples_total) == (
+        single, other = (respond(m, p2=p2, kr=kr) for m in (plain, doubled))
+        assert (
+            single.outcome, single.peak_theta_rad, single.samples_moved, single.samples_total,
+        ) == (
             other.outcome, other.peak_theta_rad, other.samples_moved, other.samples_total,
         )  # fmt: skip
         judged(steps, p2, kr)

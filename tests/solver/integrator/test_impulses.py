@@ -14,8 +14,8 @@ TOLERANCE = 1e-13
 
 
 @njit
-def compiled(corners, work, active, per_inertia, free, tolerance):
-    return after_impulses(corners, work, active, per_inertia, free, tolerance)
+def compiled(corners, work, active, per_inertia, free_standing, tolerance):
+    return after_impulses(corners, work, active, per_inertia, free_standing, tolerance)
 
 
 def test_impulses_push_and_rub_as_coulomb_says() -> None:
@@ -30,7 +30,7 @@ def test_impulses_push_and_rub_as_coulomb_says() -> None:
         friction = random.uniform(0.0, 0.8, m)
         corners = Corners(*arms.T.copy(), *normals.T.copy(), np.zeros(m), friction, np.ones(m))
         inertia = random.uniform(0.2, 1.0)
-        free = Velocity(*random.normal(size=3) * 1e-3)
+        free_standing = Velocity(*random.normal(size=3) * 1e-3)
         work = work_of(corners)
         work.pair[:] = np.arange(m)
         work.friction[:] = friction
@@ -41,7 +41,7 @@ def test_impulses_push_and_rub_as_coulomb_says() -> None:
         if (1.0 + work.moment_n**2 / inertia
                 <= friction * abs(work.moment_n * work.moment_t) / inertia).any():  # fmt: skip
             continue
-        after = compiled(corners, work, m, 1.0 / inertia, free, TOLERANCE)
+        after = compiled(corners, work, m, 1.0 / inertia, free_standing, TOLERANCE)
         total = np.zeros(3)
         for i in range(m):
             (nx, ny), mn, mt = normals[i], work.moment_n[i], work.moment_t[i]
@@ -62,7 +62,7 @@ def test_impulses_push_and_rub_as_coulomb_says() -> None:
             else:
                 doing["slips"] += 1
                 assert math.isclose(grip, -math.copysign(friction[i] * push, slip), rel_tol=1e-9)
-        assert np.allclose(np.array(free) + total, after, rtol=0.0, atol=1e-15)
+        assert np.allclose(np.array(free_standing) + total, after, rtol=0.0, atol=1e-15)
     assert min(doing.values()) > 50, doing
 
 
@@ -81,8 +81,8 @@ def test_friction_at_two_corners_stops_a_block_that_leans(
     work.pair[:], work.friction[:] = [0, 1], friction
     work.moment_n[:], work.moment_t[:] = [-0.04410462, 2.31161677], [2.34752807, 1.66009085]
     dip, speed = 0.15339, 9.80665 * 2e-4
-    free = np.array([speed * math.sin(dip), -speed * math.cos(dip), 0.0]) + momentum
-    after = compiled(corners, work, 2, per_inertia, Velocity(*free), TOLERANCE * speed)
+    free_standing = np.array([speed * math.sin(dip), -speed * math.cos(dip), 0.0]) + momentum
+    after = compiled(corners, work, 2, per_inertia, Velocity(*free_standing), TOLERANCE * speed)
     assert (work.across > 0.0).all()
     for i, (nx, ny) in enumerate(normals):
         slip = after.vx * ny - after.vy * nx + after.spin * work.moment_t[i]

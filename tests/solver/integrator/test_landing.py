@@ -22,8 +22,8 @@ EPSILON = float(np.finfo(float).eps)
 def arcs(order: int, number: int) -> list[tuple[float, FloatArray, tuple[float, float, float]]]:
     """Steps that come down once: rotation at the start, U, and theta, U and U' at the end."""
     rng = np.random.default_rng(order)
-    found = []
-    while len(found) < number:
+    values = []
+    while len(values) < number:
         ph = 10.0 ** rng.uniform(-3.0, math.log10(0.03))
         phi = rng.uniform(0.01, 0.6)
         theta = 0.0 if rng.random() < 0.5 else ph * ph * 10.0 ** rng.uniform(-6.0, 1.0)
@@ -34,8 +34,8 @@ def arcs(order: int, number: int) -> list[tuple[float, FloatArray, tuple[float, 
         rounds = u0 > 0.0 and u[1] < 0.0 and v_end < 0.0
         falls = theta > 0.0 and u0 < 0.0 and keeps_direction(u0, u[1], u_end, v_end)
         if theta + turned <= 0.0 and (rounds or falls):
-            found.append((theta, u, (theta + turned, u_end, v_end)))
-    return found
+            values.append((theta, u, (theta + turned, u_end, v_end)))
+    return values
 
 
 @pytest.mark.parametrize("order", [4, 6, 8])

@@ -16,6 +16,7 @@ import rbfrag.solver.models
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.excitation import excitation
+from rbfrag.solver.integrator.one_freedom.contact_equations import rocking_equation
 from rbfrag.solver.integrator.one_freedom.equation import (
     Condition,
     Ending,
@@ -24,10 +25,12 @@ from rbfrag.solver.integrator.one_freedom.equation import (
     Mechanism,
     Phase,
     Pose,
+    constant,
+    cosine,
+    sine,
+    turning,
 )
 from rbfrag.solver.integrator.one_freedom.follow import MechanismRun, follow
-from rbfrag.solver.integrator.one_freedom.harmonics import constant, cosine, sine, turning
-from rbfrag.solver.integrator.one_freedom.rocking import rocking_equation
 from rbfrag.solver.integrator.one_freedom.step import TURN_MAX
 from rbfrag.solver.kinds import KINDS, KindSpec
 from rbfrag.solver.models import confined_toppling, sliding, slumping
@@ -48,15 +51,15 @@ def record(seed: int, amplitude_g: float) -> GroundMotion:
 @settings(max_examples=30)
 @given(st.floats(-3.0, 3.0), st.floats(-3.0, 3.0), st.floats(-3.0, 3.0), st.floats(-3.0, 3.0))
 def test_harmonics_are_the_functions_that_they_stand_for(
-    x: float, one: float, two: float, three: float
+    x: float, first: float, two: float, three: float
 ) -> None:
-    product = cosine(one) * sine(two, -1) * (cosine(three, -1) - 2.0)
-    value = math.cos(one + x) * math.sin(two - x) * (math.cos(three - x) - 2.0)
+    product = cosine(first) * sine(two, -1) * (cosine(three, -1) - 2.0)
+    value = math.cos(first + x) * math.sin(two - x) * (math.cos(three - x) - 2.0)
     assert product(x) == pytest.approx(value, abs=1e-13)
     slope = (product(x + 1e-6) - product(x - 1e-6)) / 2e-6
     assert product.derivative()(x) == pytest.approx(slope, abs=1e-7)
-    arm = turning((one, two), -1)
-    turned = complex(one, two) * complex(math.cos(x), -math.sin(x))
+    arm = turning((first, two), -1)
+    turned = complex(first, two) * complex(math.cos(x), -math.sin(x))
     assert (arm.x(x), arm.y(x)) == pytest.approx((turned.real, turned.imag), abs=1e-13)
 
 
@@ -104,9 +107,11 @@ def test_the_engine_as_a_toppling_block(seed: int, scale: float) -> None:
 
 
 MECHANISMS = {
-    "slump": slumping.mechanism(on_planes(Block.from_angles(45, 65, 2.0), 12, 35, 30)),
-    "small slump": slumping.mechanism(on_planes(Block.from_angles(40, 75, 0.2), 15, 30, 35)),
-    "confined": confined_toppling.mechanism(on_planes(Block.from_angles(-60, 20, 1.0), 15, 35, 35)),
+    "slump": slumping.MODEL.mechanism(on_planes(Block.from_angles(45, 65, 2.0), 12, 35, 30)),
+    "small slump": slumping.MODEL.mechanism(on_planes(Block.from_angles(40, 75, 0.2), 15, 30, 35)),
+    "confined": confined_toppling.MODEL.mechanism(
+        on_planes(Block.from_angles(-60, 20, 1.0), 15, 35, 35)
+    ),
 }
 
 
@@ -138,7 +143,9 @@ def without_history(run: MechanismRun) -> list[object]:
     return [run.phase.name, *(getattr(plain, name) for name in names)]
 
 
-TWO_WAY = sliding.mechanism(on_planes(Block.from_angles(10, 60, 1.0), 12, 30, 30, two_way=True))
+TWO_WAY = sliding.MODEL.mechanism(
+    on_planes(Block.from_angles(10, 60, 1.0), 12, 30, 30, two_way=True)
+)
 
 
 @pytest.mark.parametrize("calm", [1, 15, 16, 17, 200])
@@ -270,8 +277,8 @@ def test_an_end_nearer_to_the_limit_than_the_error_is_open() -> None:
 FIFTH = '''
 """A block on a belt: a model of a test."""
 from rbfrag.solver.integrator.one_freedom.equation import Ending, Equation, Mechanism, Phase, Pose
-from rbfrag.solver.integrator.one_freedom.harmonics import constant
-from rbfrag.solver.mechanism import MechanismKind
+from rbfrag.solver.integrator.one_freedom.equation import constant
+from rbfrag.solver.simulation import MechanismKind
 from rbfrag.solver.results import Outcome
 
 

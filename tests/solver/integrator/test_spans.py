@@ -9,7 +9,7 @@ import pytest
 
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.solver.excitation import Excitation, excitation
-from rbfrag.solver.integrator.spans import COLUMNS, fill_spans, span_step
+from rbfrag.solver.integrator.block_excitation import COLUMNS, fill_spans, span_step
 from rbfrag.solver.integrator.state import StepExcitation
 from rbfrag.solver.integrator.taylor import ORDER, taylor_step, turn
 from tests.solver.search.test_critical import shaking
@@ -100,7 +100,7 @@ def test_the_error_of_a_span_of_rough_samples_is_within_its_bound() -> None:
         p = 10.0 ** rng.uniform(-2.5, -2.0) / (length * 0.01)
         table = np.empty((1, COLUMNS))
         fill_spans(drive.interval_s, drive.k_h, drive.w, length, table)
-        exact, spanned = (integrated(drive, p, each, length) for each in (0, length))
+        exact, spanned = (integrated(drive, p, item, length) for item in (0, length))
         bound = ((p * table[0, 0]) ** 2 * table[0, 18]) ** 2
         errors.append((abs(exact[1] - spanned[1]), bound))
     error, bounds = np.array(errors).T

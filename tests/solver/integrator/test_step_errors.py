@@ -15,7 +15,7 @@ from numba import njit
 from benchmarks.extended.double_double import Pair, add, div, mul, sine_versine, sub
 from benchmarks.extended.toppling import HIGHEST, _series, _value
 from rbfrag.solver.integrator.state import Corner, Peak, State, StepExcitation
-from rbfrag.solver.integrator.step import drift_of_step, take_step
+from rbfrag.solver.integrator.taylor import drift_of_step, take_step
 from rbfrag.solver.integrator.toppling_kernel import TrajectoryBounds, errors_after_impact
 from rbfrag.solver.results import FloatArray
 
@@ -129,8 +129,8 @@ def test_no_step_adds_more_than_its_estimate(steps: FloatArray) -> None:
 
 def test_an_estimate_is_no_alarm(steps: FloatArray) -> None:
     # that an estimate bounds is worth nothing where it is far too large
-    known = steps[steps[:, 0] > 0.0]
-    assert np.median(known[:, 1] / known[:, 0]) < 100.0
+    expected = steps[steps[:, 0] > 0.0]
+    assert np.median(expected[:, 1] / expected[:, 0]) < 100.0
 
 
 def test_theta_drifts_by_no_more_than_its_own_bound(steps: FloatArray) -> None:
@@ -165,17 +165,17 @@ def through(
 @pytest.mark.parametrize("drift", [1e-13, 1e-9, 2e-7])
 def test_a_late_impact_starts_a_late_motion(impact: float, threshold: float, drift: float) -> None:
     push = threshold * CORNER.cos
-    known, hidden = through(impact, threshold, drift)
+    expected, hidden = through(impact, threshold, drift)
     assert not hidden
     if impact * impact <= 4.0 * push * drift:
         return  # a graze, which has a test of its own
     # theta = drift - v t + push t²/2 in units of 1/p: when a block that is too high comes to rest
     late = 2.0 * drift / (impact + math.sqrt(impact * impact - 2.0 * push * drift))
     # by then the other one has started from rest
-    assert known.error >= push * late + 0.5 * push * late**2
-    assert known.drift >= 0.5 * push * late**2
+    assert expected.error >= push * late + 0.5 * push * late**2
+    assert expected.drift >= 0.5 * push * late**2
     # and not by more than some times that
-    assert known.error <= 5.0 * push * late
+    assert expected.error <= 5.0 * push * late
 
 
 @pytest.mark.parametrize("impact", [0.0, 1e-7, 1e-5])
@@ -183,11 +183,11 @@ def test_a_late_impact_starts_a_late_motion(impact: float, threshold: float, dri
 def test_a_graze_may_be_none(impact: float, threshold: float) -> None:
     drift = 1e-9
     push = threshold * CORNER.cos
-    known, hidden = through(impact, threshold, drift, error=0.6 * impact)
+    expected, hidden = through(impact, threshold, drift, error=0.6 * impact)
     # the block loses its speed where it touches; lower by `drift`, it would have touched with
     # sqrt(v² + 2 push drift), and one that is higher keeps its own
-    assert known.error >= 0.6 * impact + math.sqrt(impact * impact + 2.0 * push * drift)
-    assert known.error > 0.0 or impact == threshold == 0.0
+    assert expected.error >= 0.6 * impact + math.sqrt(impact * impact + 2.0 * push * drift)
+    assert expected.error > 0.0 or impact == threshold == 0.0
     assert not hidden
 
 
@@ -203,10 +203,10 @@ def test_a_block_that_may_not_touch_is_no_later_than_never(slower: float) -> Non
     drift, threshold = 1e-9, 1.0
     most = math.sqrt(2.0 * threshold * CORNER.cos * drift)
     impact = slower * most * (1.0 - 1e-9)
-    known, _ = through(impact, threshold, drift)
-    assert impact <= known.error <= 3.0 * most
+    expected, _ = through(impact, threshold, drift)
+    assert impact <= expected.error <= 3.0 * most
 
 
 def test_an_impact_that_ends_in_rest_ends_the_error() -> None:
-    known, hidden = through(0.1, -0.2, 1e-9, error=1e-9)
-    assert (known.error, known.drift, hidden) == (0.0, 0.0, False)
+    expected, hidden = through(0.1, -0.2, 1e-9, error=1e-9)
+    assert (expected.error, expected.drift, hidden) == (0.0, 0.0, False)

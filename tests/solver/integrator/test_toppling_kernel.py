@@ -43,41 +43,41 @@ def test_energy_is_kept_in_free_rocking() -> None:
     motion = GroundMotion.from_nodes(times, [0.0, 0.5, 0.5, 0.0] + [0.0] * (len(times) - 4))
     history = respond(motion, p2=4.0, kr=0.3, history=True).history
     assert history is not None
-    free = (history.time_s > 0.2) & (history.theta_rad > 0.0)
-    assert free.sum() > 20
-    x = math.atan(0.3) - history.theta_rad[free]
-    energy = 0.5 * history.theta_dot_rad_s[free] ** 2 - 4.0 * (1.0 - np.cos(x))
+    free_standing = (history.time_s > 0.2) & (history.theta_rad > 0.0)
+    assert free_standing.sum() > 20
+    x = math.atan(0.3) - history.theta_rad[free_standing]
+    energy = 0.5 * history.theta_dot_rad_s[free_standing] ** 2 - 4.0 * (1.0 - np.cos(x))
     assert np.ptp(energy) < 1e-14
 
 
 @pytest.mark.parametrize("seed", range(5))
 def test_reverse_is_forward_of_the_negated_record(seed: int) -> None:
     motion = noise(seed)
-    one = respond(motion, p2=5.0, kr=0.25, polarity="reverse")
+    single = respond(motion, p2=5.0, kr=0.25, polarity="reverse")
     other = respond(motion.scaled(-1.0), p2=5.0, kr=0.25)
-    assert (one.outcome, one.peak_theta_rad) == (other.outcome, other.peak_theta_rad)
+    assert (single.outcome, single.peak_theta_rad) == (other.outcome, other.peak_theta_rad)
 
 
 @pytest.mark.parametrize("factor", [0.5, 3.0])
 def test_only_p_times_time_matters(factor: float) -> None:
     motion = noise(1)
     stretched = GroundMotion(motion.acceleration_g, 0.01 * factor)
-    one = respond(motion, p2=5.0, kr=0.35)
+    single = respond(motion, p2=5.0, kr=0.35)
     other = respond(stretched, p2=5.0 / factor**2, kr=0.35)
-    assert one.outcome is Outcome.STABLE
-    assert one.peak_theta_rad
-    assert other.peak_theta_rad == pytest.approx(one.peak_theta_rad, rel=1e-11)
+    assert single.outcome is Outcome.STABLE
+    assert single.peak_theta_rad
+    assert other.peak_theta_rad == pytest.approx(single.peak_theta_rad, rel=1e-11)
 
 
 def test_constant_vertical_acceleration_is_a_scaled_gravity() -> None:
     # k_h/(1+k_v) and p² (1+k_v) take their places; free motion comes back before the end
     motion = GroundMotion.from_nodes([0.0, 0.0, 0.1, 0.1, 3.0], [0.0, 0.6, 0.6, 0.0, 0.0])
     vertical = GroundMotion.from_nodes([0.0, 0.0, 0.1, 0.1, 3.0], [-0.4] * 5)
-    one = respond(motion, p2=5.0, kr=0.4, vertical=vertical)
+    single = respond(motion, p2=5.0, kr=0.4, vertical=vertical)
     other = respond(motion.scaled(1.0 / 0.6), p2=5.0 * 0.6, kr=0.4)
-    assert one.outcome is Outcome.STABLE
-    assert one.peak_theta_rad
-    assert one.peak_theta_rad == pytest.approx(other.peak_theta_rad, rel=1e-12)
+    assert single.outcome is Outcome.STABLE
+    assert single.peak_theta_rad
+    assert single.peak_theta_rad == pytest.approx(other.peak_theta_rad, rel=1e-12)
 
 
 def test_throw_is_reported_where_effective_gravity_vanishes_inside_an_interval() -> None:
@@ -181,8 +181,8 @@ def test_past_the_critical_angle_and_back() -> None:
 def test_zero_padding_changes_nothing() -> None:
     motion = noise(5)
     padded = GroundMotion(np.pad(motion.acceleration_g, (5000, 0)), 0.01)
-    one, other = (respond(m, p2=6.0, kr=0.3) for m in (motion, padded))
-    assert (one.outcome, one.peak_theta_rad, one.steps) == (
+    single, other = (respond(m, p2=6.0, kr=0.3) for m in (motion, padded))
+    assert (single.outcome, single.peak_theta_rad, single.steps) == (
         other.outcome,
         other.peak_theta_rad,
         other.steps,
@@ -261,7 +261,7 @@ def test_a_run_whose_error_outgrew_the_block_says_so(records_dir: Path) -> None:
     path = next(records_dir.rglob("*HSES_20.V2A"))
     motion = read_motions(path)[1]
     kr = 0.04831733532494291 * motion.pga_g
-    found = respond(motion, p2=0.3, kr=kr, polarity="reverse")
-    assert found.error_estimate > math.atan(kr)
-    assert found.outcome is Outcome.UNDETERMINED
-    assert found.peak_theta_n is None
+    result = respond(motion, p2=0.3, kr=kr, polarity="reverse")
+    assert result.error_estimate > math.atan(kr)
+    assert result.outcome is Outcome.UNDETERMINED
+    assert result.peak_theta_n is None

@@ -10,7 +10,7 @@ from rbfrag.solver.excitation import excitation
 from rbfrag.solver.integrator.batch import simulate_many
 from rbfrag.solver.integrator.block_excitation import block_excitation
 from rbfrag.solver.integrator.toppling_kernel import TOPPLED
-from rbfrag.solver.search.lower_bound import all_topple_below, least_rate
+from rbfrag.solver.search.borders import all_topple_below, least_rate
 from rbfrag.solver.toppling_run import respond
 from tests.solver.search.test_critical import shaking
 
@@ -18,7 +18,7 @@ from tests.solver.search.test_critical import shaking
 @pytest.mark.parametrize("with_vertical", [False, True])
 def test_every_block_below_topples(with_vertical: bool) -> None:
     rng = np.random.default_rng(3)
-    found = 0
+    result = 0
     for seed in range(12):
         vertical = shaking(seed + 70, pga_g=0.3) if with_vertical else None
         excited = excitation(shaking(seed), vertical)
@@ -26,10 +26,10 @@ def test_every_block_below_topples(with_vertical: bool) -> None:
             g = block_excitation(excited, p2=p2)
             low = all_topple_below(g, 1e-3, 0.5, 1e-9, np.empty(excited.q.size))
             if low > 1e-3:
-                found += 1
+                result += 1
                 runs = simulate_many(excited, p2=p2, kr=rng.uniform(1e-3, low, 60))
                 assert (runs.outcome == TOPPLED).all()
-    assert found > 20
+    assert result > 20
 
 
 def test_no_block_that_stays_falls_back_faster_than_the_bound() -> None:

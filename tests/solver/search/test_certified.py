@@ -15,8 +15,15 @@ from rbfrag.solver.critical_result import CriticalResult
 from rbfrag.solver.excitation import Excitation, excitation
 from rbfrag.solver.integrator.block_excitation import remaining_excitation
 from rbfrag.solver.integrator.toppling_kernel import STABLE, TOPPLED
-from rbfrag.solver.search.certified import MAP_DEPTH, certified_map, keeps_order
+from rbfrag.solver.search.certified import (
+    MAP_DEPTH,
+    CertifiedMap,
+    certified_map,
+    keeps_order,
+    outcome_intervals,
+)
 from rbfrag.solver.search.critical import critical
+from rbfrag.solver.search.march import SAFE, TOPPLES
 from rbfrag.solver.toppling_run import simulate
 from tests.physics.linear_block import largest_failing
 
@@ -48,8 +55,8 @@ def pulses(seed: int) -> GroundMotion:
 
 def started(seed: int) -> GroundMotion:
     """Above most thresholds from the first sample on, and not at rest at the last."""
-    whole = noise(seed)
-    return GroundMotion(whole.acceleration_g[430:470] + 0.25, 0.01)
+    complete = noise(seed)
+    return GroundMotion(complete.acceleration_g[430:470] + 0.25, 0.01)
 
 
 MAKERS = {"noise": noise, "steps": steps, "pulses": pulses, "started": started}
@@ -59,17 +66,17 @@ def contradictions(
     result: CriticalResult, excited: Excitation, count: int, rng: np.random.Generator
 ) -> list[str]:
     """Blocks inside decided intervals that do otherwise."""
-    found = []
-    for low, high, what in zip(
+    values = []
+    for low, high, subject in zip(
         result.intervals.k_lo, result.intervals.k_hi, result.intervals.outcome, strict=True
     ):
-        if what == "undecided":
+        if subject == "undecided":
             continue
         for ratio in rng.uniform(low, high, count):
             outcome = simulate(excited, p2=result.p2, kr=ratio * excited.pga_g).outcome
-            if outcome in (STABLE, TOPPLED) and (outcome == TOPPLED) != (what == "topples"):
-                found.append(f"{ratio!r} in [{low!r}, {high!r}] {what}")
-    return found
+            if outcome in (STABLE, TOPPLED) and (outcome == TOPPLED) != (subject == "topples"):
+                values.append(f"{ratio!r} in [{low!r}, {high!r}] {subject}")
+    return values
 
 
 @pytest.mark.parametrize("kind", sorted(MAKERS))
@@ -109,9 +116,9 @@ def test_brute_force_finds_nothing_that_the_map_denies(seed: int) -> None:
     runs = np.array([simulate(excited, p2=12.0, kr=r * excited.pga_g).outcome for r in ratios])
     at = np.searchsorted(result.intervals.k_hi, ratios)
     at = np.minimum(at, len(result.intervals.outcome) - 1)
-    said = np.array(result.intervals.outcome)[at]
-    assert not np.any((said == "safe") & (runs == TOPPLED))
-    assert not np.any((said == "topples") & (runs == STABLE))
+    message = np.array(result.intervals.outcome)[at]
+    assert not np.any((message == "safe") & (runs == TOPPLED))
+    assert not np.any((message == "topples") & (runs == STABLE))
     assert result.upper is not None
     assert ratios[runs == TOPPLED].max() <= result.upper
 
@@ -150,12 +157,12 @@ def test_coarse_and_fine_maps_agree_where_both_decide(kind: str) -> None:
         assert coarse.intervals.k_hi[-1] == fine.intervals.k_hi[-1]
         edges = np.unique(np.concatenate([fine.intervals.k_hi, coarse.intervals.k_hi]))
         middles = 0.5 * (edges[1:] + edges[:-1])
-        said = [
-            np.array(one.intervals.outcome)[np.searchsorted(one.intervals.k_hi, middles)]
-            for one in (fine, coarse)
+        message = [
+            np.array(item.intervals.outcome)[np.searchsorted(item.intervals.k_hi, middles)]
+            for item in (fine, coarse)
         ]
-        both = (said[0] != "undecided") & (said[1] != "undecided")
-        assert np.array_equal(said[0][both], said[1][both])
+        both = (message[0] != "undecided") & (message[1] != "undecided")
+        assert np.array_equal(message[0][both], message[1][both])
         compared += int(both.sum())
     assert compared > 0
 
@@ -185,7 +192,7 @@ def test_short_answer_agrees_with_the_full_map() -> None:
 
 
 def test_fresh_excursions_fail_monotonely_in_kr() -> None:
-    """What K_up rests on: cut the record before a rise, and weaker blocks only do worse."""
+    """The premise of K_up: cut the record before a rise, and weaker blocks only do worse."""
     motion = noise(3)
     a = motion.acceleration_g
     rng = np.random.default_rng(0)
@@ -216,8 +223,8 @@ def test_linear_upper_bound_is_the_backward_integral() -> None:
     assert still[0] == pytest.approx(integral[0], rel=1e-3, abs=1e-5)
     assert 0 < node < motion.npts
     # of the linearised block it is the largest failing excursion from rest itself
-    found = largest_failing(excitation(motion), p * p)
-    assert found == pytest.approx(greatest, rel=1e-8)
+    result = largest_failing(excitation(motion), p * p)
+    assert result == pytest.approx(greatest, rel=1e-8)
 
 
 def test_plateau_exactly_at_the_block_is_no_start() -> None:
@@ -275,3 +282,20 @@ def test_recorded_motions_are_certified(records_dir: Path, name: str, p2: float)
         assert contradictions(result, excited, 40, rng) == []
         peaks: NDArray[np.float64] = result.points.theta_n
         assert math.isnan(peaks[-1])
+
+
+def test_ends_that_fall_together_in_the_quotient_leave_no_interval() -> None:
+    # two neighbouring numbers whose quotients by this PGA are one
+    pga = 3.0
+    edge = next(x for x in np.linspace(0.1, 0.2, 997) if x / pga == np.nextafter(x, 1.0) / pga)
+    above = np.nextafter(edge, 1.0)
+    high = np.array([1.0, above, edge])
+    low = np.array([above, edge, 0.01])
+    result = CertifiedMap(
+        k_up=1.0, low=low, high=high, verdict=np.array([SAFE, TOPPLES, SAFE]),
+        point=np.full(3, np.nan), reached=0.01, complete=True, runs=3, steps=3,
+    )  # fmt: skip
+    retained = outcome_intervals(result, pga, 1.0)
+    assert retained.outcome == ("safe", "safe")
+    assert (retained.k_hi > retained.k_lo).all()
+    np.testing.assert_array_equal(retained.k_lo[1:], retained.k_hi[:-1])

@@ -99,8 +99,8 @@ def test_safe_island_below_the_critical_value_is_reported() -> None:
     assert outcome(motion, floor + 1e-9, 10.0) is Outcome.TOPPLED
     assert outcome(motion, floor - 1e-9, 10.0) is Outcome.STABLE
     weaker = [
-        what
-        for high, what in zip(result.intervals.k_hi, result.intervals.outcome, strict=True)
+        subject
+        for high, subject in zip(result.intervals.k_hi, result.intervals.outcome, strict=True)
         if high <= floor
     ]
     assert {"topples", "safe"} <= set(weaker)
@@ -191,11 +191,11 @@ def test_no_certificate_where_the_proof_does_not_reach() -> None:
 
 def test_reverse_is_forward_of_the_negated_motion() -> None:
     motion = shaking(7)
-    one = critical(motion, p2=3.0, polarity="reverse")
+    single = critical(motion, p2=3.0, polarity="reverse")
     other = critical(motion.scaled(-1.0), p2=3.0)
-    assert one.kr_over_pga == other.kr_over_pga
-    assert one.pga_g == other.pga_g
-    assert one.kr_over_pga != critical(motion, p2=3.0).kr_over_pga
+    assert single.kr_over_pga == other.kr_over_pga
+    assert single.pga_g == other.pga_g
+    assert single.kr_over_pga != critical(motion, p2=3.0).kr_over_pga
 
 
 @pytest.mark.parametrize(

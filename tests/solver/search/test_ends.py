@@ -19,15 +19,15 @@ def test_the_lower_end_topples_and_the_upper_stays(number: int) -> None:
     rng = np.random.default_rng(21)
     for _ in range(number + 1):
         motion, p2 = made_up(rng)
-    found = critical(motion, p2=p2)
-    assert found.certified
-    assert found.lower is not None
-    assert found.upper is not None
+    result = critical(motion, p2=p2)
+    assert result.certified
+    assert result.lower is not None
+    assert result.upper is not None
     drive = excitation(motion)
-    assert truth(drive, p2=p2, kr=found.lower * drive.pga_g).outcome == "toppled"
-    assert truth(drive, p2=p2, kr=found.upper * drive.pga_g).outcome == "stable"
+    assert truth(drive, p2=p2, kr=result.lower * drive.pga_g).outcome == "toppled"
+    assert truth(drive, p2=p2, kr=result.upper * drive.pga_g).outcome == "stable"
     # the ends are near one another all the same
-    assert found.upper - found.lower < 2e-9 * found.upper
+    assert result.upper - result.lower < 2e-9 * result.upper
 
 
 def test_where_no_run_can_tell_an_interval_that_is_proven_to_topple_does() -> None:
@@ -35,9 +35,9 @@ def test_where_no_run_can_tell_an_interval_that_is_proven_to_topple_does() -> No
     rng = np.random.default_rng(21)
     for _ in range(1688):
         motion, p2 = made_up(rng)
-    found = critical(motion, p2=p2)
-    assert found.certified
-    assert found.lower is not None
+    result = critical(motion, p2=p2)
+    assert result.certified
+    assert result.lower is not None
     drive = excitation(motion)
-    assert "toppled" not in found.points.outcome
-    assert truth(drive, p2=p2, kr=found.lower * drive.pga_g).outcome == "toppled"
+    assert "toppled" not in result.points.outcome
+    assert truth(drive, p2=p2, kr=result.lower * drive.pga_g).outcome == "toppled"

@@ -18,7 +18,6 @@ from rbfrag.solver.critical import critical
 from rbfrag.solver.critical_result import CriticalResult
 from rbfrag.solver.excitation import excitation
 from rbfrag.solver.integrator.one_freedom.follow import follow
-from rbfrag.solver.mechanism import shaken_mechanism
 from rbfrag.solver.models import model_of_kind
 from rbfrag.solver.models.sliding import sliding_displacements
 from rbfrag.solver.respond import respond
@@ -31,6 +30,7 @@ from rbfrag.solver.search.incremental_scaling import (
     first_motion,
     scan_rules,
 )
+from rbfrag.solver.simulation import shaken_mechanism
 from tests.synthetic import shaking as samples
 
 PLANES = {"beta_deg": 22.0, "phi_deg": 30.0}
@@ -76,9 +76,9 @@ def test_the_block_moves_just_above_the_scale_of_first_motion(with_vertical: boo
 @pytest.mark.parametrize("rotation_deg", [None, 1.0, 4.0])
 def test_a_brute_force_scan_finds_the_same_scale(rotation_deg: float | None) -> None:
     motion, block = shaking(), slump()
-    found = search(motion, block, rotation_deg=rotation_deg)
-    assert found.status == "found"
-    lower, upper = found.lower_scale, found.scale
+    result = search(motion, block, rotation_deg=rotation_deg)
+    assert result.status == "found"
+    lower, upper = result.lower_scale, result.scale
     assert upper - lower <= 1e-6 * upper
 
     def fails(scale: float) -> bool:
@@ -88,46 +88,46 @@ def test_a_brute_force_scan_finds_the_same_scale(rotation_deg: float | None) -> 
         assert answer.peak_theta_rad is not None
         return rotation_deg is not None and answer.peak_theta_rad >= math.radians(rotation_deg)
 
-    scan = np.geomspace(found.starts_scale, upper * 1.3, 150)
+    scan = np.geomspace(result.starts_scale, upper * 1.3, 150)
     assert not any(fails(s) for s in scan[scan <= lower])
     assert fails(upper)
 
 
 def test_the_critical_scale_is_the_inverse_of_the_strength_of_the_record() -> None:
     motion, block = shaking(), slump()
-    one, three = (search(times(motion, f), block, rotation_deg=2.0) for f in (1.0, 3.0))
-    assert three.scale == pytest.approx(one.scale / 3.0, rel=3e-6)
-    assert three.y_m_s == pytest.approx(3.0 * (one.y_m_s or 0.0), rel=3e-6)
-    assert three.kr_over_pga == pytest.approx(one.kr_over_pga, rel=3e-6)
+    single, three = (search(times(motion, f), block, rotation_deg=2.0) for f in (1.0, 3.0))
+    assert three.scale == pytest.approx(single.scale / 3.0, rel=3e-6)
+    assert three.y_m_s == pytest.approx(3.0 * (single.y_m_s or 0.0), rel=3e-6)
+    assert three.kr_over_pga == pytest.approx(single.kr_over_pga, rel=3e-6)
 
 
 def test_a_small_slump_turns_as_far_as_a_level_slide_says() -> None:
     # θ'' = p_s² (k_h - k_s) is Newmark's block times p_s²/g while θ is small
     motion, block = shaking(), slump(2.0)
-    found = search(motion, block, rotation_deg=0.02)
-    assert found.kr_over_pga is not None
-    slid = sliding_displacements(motion, [found.kr_over_pga])[0] * found.scale
-    turned = found.p2 * slid / STANDARD_GRAVITY_M_S2
+    result = search(motion, block, rotation_deg=0.02)
+    assert result.kr_over_pga is not None
+    slid = sliding_displacements(motion, [result.kr_over_pga])[0] * result.scale
+    turned = result.p2 * slid / STANDARD_GRAVITY_M_S2
     assert turned == pytest.approx(math.radians(0.02), rel=2e-3)
 
 
 def test_rotations_are_reached_one_after_the_other_and_failure_last() -> None:
     motion, block = shaking(), slump()
     answers = [search(motion, block, rotation_deg=d) for d in (0.5, 1.0, 2.0, 5.0, None)]
-    scales = [found.scale for found in answers]
-    known = [scale for scale in scales if scale is not None]
-    assert len(known) == 5
-    assert known == sorted(known)
+    scales = [result.scale for result in answers]
+    expected = [scale for scale in scales if scale is not None]
+    assert len(expected) == 5
+    assert expected == sorted(expected)
 
 
 def test_a_block_that_leaves_its_back_plane_is_followed_to_its_fall() -> None:
     big = Block.from_angles(45.0, 70.0, 60.0)
     planes = {"beta_deg": 10.0, "phi_deg": 40.0}
-    found = critical(shaking(), block=big, **planes)
-    assert found.status == "found"
-    assert any("past a lost contact" in sentence for sentence in found.warnings)
+    result = critical(shaking(), block=big, **planes)
+    assert result.status == "found"
+    assert any("past a lost contact" in sentence for sentence in result.warnings)
     lower, upper = (
-        respond(times(shaking(), getattr(found, name)), block=big, **planes)
+        respond(times(shaking(), getattr(result, name)), block=big, **planes)
         for name in ("lower_scale", "scale")
     )
     assert upper.outcome is Outcome.TOPPLED
@@ -136,26 +136,26 @@ def test_a_block_that_leaves_its_back_plane_is_followed_to_its_fall() -> None:
 
 def test_a_record_that_drives_only_uphill_never_moves_the_block() -> None:
     pulse = GroundMotion(-np.hanning(60), 0.01)
-    found = search(pulse, slump())
-    assert (found.status, found.starts_scale, found.n_runs) == ("no_motion", None, 0)
-    assert found.certified
+    result = search(pulse, slump())
+    assert (result.status, result.starts_scale, result.n_runs) == ("no_motion", None, 0)
+    assert result.certified
     still = search(GroundMotion(np.zeros(20), 0.01), slump())
     assert still.status == "no_motion"
     assert still.as_dict()["scale_limit"] is None
 
 
 def test_what_was_seen_is_told_as_intervals_and_points() -> None:
-    found = search(shaking(), slump(), rotation_deg=2.0)
-    assert found.status == "found"
-    seen = found.intervals
+    result = search(shaking(), slump(), rotation_deg=2.0)
+    assert result.status == "found"
+    seen = result.intervals
     assert seen.outcome[-1] == "safe"
-    assert seen.k_lo[-1] == found.upper
+    assert seen.k_lo[-1] == result.upper
     assert "topples" in seen.outcome
     assert np.all(np.diff(seen.k_lo) > 0.0)
-    assert seen.k_hi[seen.outcome.index("topples")] == found.kr_over_pga
-    assert found.kr_over_pga in found.points.kr_over_pga
-    assert not found.certified
-    assert "not proven" in found.as_dict()["warnings"][-1]
+    assert seen.k_hi[seen.outcome.index("topples")] == result.kr_over_pga
+    assert result.kr_over_pga in result.points.kr_over_pga
+    assert not result.certified
+    assert "not proven" in result.as_dict()["warnings"][-1]
 
 
 @settings(max_examples=10)
@@ -163,26 +163,26 @@ def test_what_was_seen_is_told_as_intervals_and_points() -> None:
 def test_everything_that_was_looked_at_below_the_critical_scale_is_safe(
     seed: int, size: float
 ) -> None:
-    found = search(shaking(seed), slump(size), rotation_deg=1.0)
-    limit = min(found.scale if found.scale is not None else math.inf, found.scale_limit)
-    assert all(run.verdict == "safe" for run in found.runs if run.scale < limit)
-    scales = [run.scale for run in found.runs]
+    result = search(shaking(seed), slump(size), rotation_deg=1.0)
+    limit = min(result.scale if result.scale is not None else math.inf, result.scale_limit)
+    assert all(run.verdict == "safe" for run in result.runs if run.scale < limit)
+    scales = [run.scale for run in result.runs]
     assert scales == sorted(set(scales))
-    assert found.n_runs == len(scales)
+    assert result.n_runs == len(scales)
 
 
 @pytest.mark.parametrize("rotation_deg", [None, 2.0])
 def test_a_confined_block_is_searched_past_its_fall_on_the_base(rotation_deg: float | None) -> None:
     block, planes = Block.from_angles(-40.0, 20.0, 0.5), {"beta_deg": 5.0, "phi_deg": 30.0}
-    found = critical(
+    result = critical(
         shaking(), block=block, **planes, kind="confined_toppling", rotation_deg=rotation_deg
     )
-    assert found.status == "found"
-    lower, upper = found.lower_scale, found.scale
+    assert result.status == "found"
+    lower, upper = result.lower_scale, result.scale
     # between them runs may end closer to failure than their error
     assert upper - lower < 2e-3 * upper
     outcomes = set()
-    for scale in (*np.geomspace(found.starts_scale, lower, 40)[1:], upper):
+    for scale in (*np.geomspace(result.starts_scale, lower, 40)[1:], upper):
         answer = respond(times(shaking(), scale), block=block, **planes)
         peak = answer.peak_theta_rad
         outcomes.add(answer.outcome)
@@ -202,12 +202,12 @@ def of_verdicts(verdict: Callable[[float], Verdict]) -> ScaleSearch:
 
 
 def test_scales_too_close_to_failure_lie_inside_the_bracket() -> None:
-    found = of_verdicts(lambda s: "safe" if s < 2.0 else "undecided" if s < 2.2 else "fails")
-    assert (found.status, found.reentrant) == ("found", False)
-    assert found.lower == pytest.approx(2.0, rel=1e-6)
-    assert found.scale == pytest.approx(2.2, rel=1e-6)
-    assert found.lower < 2.0
-    assert found.scale >= 2.2
+    result = of_verdicts(lambda s: "safe" if s < 2.0 else "undecided" if s < 2.2 else "fails")
+    assert (result.status, result.reentrant) == ("found", False)
+    assert result.lower == pytest.approx(2.0, rel=1e-6)
+    assert result.scale == pytest.approx(2.2, rel=1e-6)
+    assert result.lower < 2.0
+    assert result.scale >= 2.2
     # one that is spared after all does not make those below it safe
     spared = of_verdicts(lambda s: "undecided" if 2.0 < s < 2.3 else "safe" if s < 4.0 else "fails")
     assert spared.lower == pytest.approx(2.0, rel=1e-6)
@@ -246,16 +246,16 @@ def test_a_block_that_slumps_at_rest_is_rejected() -> None:
 
 
 def test_beyond_the_end_of_the_model_nothing_is_told() -> None:
-    found = search(shaking(), slump(), rotation_deg=2.0)
-    last = found.runs[0].scale
+    result = search(shaking(), slump(), rotation_deg=2.0)
+    last = result.runs[0].scale
     ended = ScaleSearch(
         rotation_deg=2.0,
-        pga_g=found.pga_g,
-        yield_g=found.yield_g,
-        starts=found.starts_scale,
+        pga_g=result.pga_g,
+        yield_g=result.yield_g,
+        starts=result.starts_scale,
         scale_limit=last,
         status="below_limit",
-        runs=found.runs,
+        runs=result.runs,
     )
     assert any(run.verdict == "fails" for run in ended.runs)
     assert ended.intervals().outcome == ("safe",)

@@ -38,20 +38,20 @@ def test_rules_are_right_about_any_interval(kind: str, with_vertical: bool) -> N
 
 def test_a_map_that_is_given_up_says_from_where(monkeypatch: pytest.MonkeyPatch) -> None:
     motion = noise(np.random.default_rng(3))
-    whole = critical(motion, p2=3.0, full_map=True)
-    assert whole.intervals.outcome[0] == "topples"
-    assert not any("given up" in sentence for sentence in whole.warnings)
+    complete = critical(motion, p2=3.0, full_map=True)
+    assert complete.intervals.outcome[0] == "topples"
+    assert not any("given up" in sentence for sentence in complete.warnings)
     monkeypatch.setattr(certified, "MAP_STEPS", 300)
     part = critical(motion, p2=3.0, full_map=True)
     assert part.certified
-    assert part.kr_over_pga == whole.kr_over_pga
+    assert part.kr_over_pga == complete.kr_over_pga
     assert part.intervals.k_lo[0] == pytest.approx(0.01, rel=1e-12)
     # what lies below it is undecided, but for the blocks that topple whatever the search finds
-    open_ = [i for i, what in enumerate(part.intervals.outcome) if what == "undecided"]
+    open_ = [i for i, subject in enumerate(part.intervals.outcome) if subject == "undecided"]
     widths = part.intervals.k_hi - part.intervals.k_lo
     given_up = part.intervals.k_hi[max(open_, key=lambda i: widths[i])]
     assert 0.01 < given_up < part.lower  # type: ignore[operator]
-    (said,) = (s for s in part.warnings if "given up at" in s)
+    (message,) = (s for s in part.warnings if "given up at" in s)
     # what it left undecided just above belongs to the same interval
     # (the sentence has six digits)
-    assert float(said.split("given up at ")[1].split(" PGA")[0]) <= float(f"{given_up:.6g}")
+    assert float(message.split("given up at ")[1].split(" PGA")[0]) <= float(f"{given_up:.6g}")

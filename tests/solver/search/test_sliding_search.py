@@ -36,16 +36,16 @@ def test_the_strength_of_a_rectangular_pulse_is_the_closed_form(
     threshold_m: float, amplitude_g: float, duration_s: float
 ) -> None:
     # D = A g T²/2 (A/k_y - 1)
-    found = critical(pulse(amplitude_g, duration_s), displacement_m=threshold_m)
+    result = critical(pulse(amplitude_g, duration_s), displacement_m=threshold_m)
     excited = amplitude_g * STANDARD_GRAVITY_M_S2 * duration_s**2
     expected = 1.0 / (1.0 + 2.0 * threshold_m / excited)
-    assert found.status == "found"
-    assert found.kr_over_pga == pytest.approx(expected, abs=1.1e-9)
-    assert found.lower is not None
-    assert found.upper is not None
-    assert found.lower <= expected + 1e-12
-    assert found.upper >= expected - 1e-12
-    assert found.upper - found.lower <= 1e-9
+    assert result.status == "found"
+    assert result.kr_over_pga == pytest.approx(expected, abs=1.1e-9)
+    assert result.lower is not None
+    assert result.upper is not None
+    assert result.lower <= expected + 1e-12
+    assert result.upper >= expected - 1e-12
+    assert result.upper - result.lower <= 1e-9
 
 
 @settings(max_examples=25)
@@ -80,11 +80,11 @@ def test_the_bracket_lies_between_strengths_that_do_and_do_not_slide_so_far(
 ) -> None:
     motion, up = pair(11)
     vertical = up if with_vertical else None
-    found = critical(motion, displacement_m=0.01, vertical=vertical, polarity="reverse")
-    assert found.status == "found"
-    assert found.lower is not None
-    assert found.upper is not None
-    ends = [found.lower, found.upper]
+    result = critical(motion, displacement_m=0.01, vertical=vertical, polarity="reverse")
+    assert result.status == "found"
+    assert result.lower is not None
+    assert result.upper is not None
+    ends = [result.lower, result.upper]
     far, near = sliding_displacements(motion, ends, vertical=vertical, polarity="reverse")
     assert far > 0.01 >= near
 
@@ -93,17 +93,17 @@ def test_displacement_scales_with_record_and_strength() -> None:
     motion, _ = pair(2)
     assert motion.dt_s is not None
     double = GroundMotion(2.0 * motion.acceleration_g, motion.dt_s)
-    one, two = sliding_displacements(motion), sliding_displacements(double)
-    np.testing.assert_allclose(two, 2.0 * one, rtol=1e-9, atol=1e-15)
+    single, two = sliding_displacements(motion), sliding_displacements(double)
+    np.testing.assert_allclose(two, 2.0 * single, rtol=1e-9, atol=1e-15)
 
 
 def test_no_distance_at_all_is_the_strength_that_first_moves() -> None:
     motion, _ = pair(7)
     for polarity, sign in (("forward", 1.0), ("reverse", -1.0)):
-        found = critical(motion, displacement_m=0.0, polarity=polarity)  # type: ignore[arg-type]
+        result = critical(motion, displacement_m=0.0, polarity=polarity)  # type: ignore[arg-type]
         most = float(np.max(sign * motion.acceleration_g))
-        assert found.kr_over_pga == most / motion.pga_g
-        assert found.n_runs == 0
+        assert result.kr_over_pga == most / motion.pga_g
+        assert result.n_runs == 0
 
 
 def test_what_never_slides_so_far_says_so() -> None:
@@ -115,8 +115,8 @@ def test_what_never_slides_so_far_says_so() -> None:
     assert critical(still, displacement_m=0.01).status == "no_motion"
     thrown = GroundMotion(-2.0 * np.hanning(50), 0.01)
     motion = GroundMotion(np.hanning(50), 0.01)
-    found = critical(motion, displacement_m=0.01, vertical=thrown)
-    assert found.status == "outside_model"
+    result = critical(motion, displacement_m=0.01, vertical=thrown)
+    assert result.status == "outside_model"
     assert np.isnan(sliding_displacements(motion, [0.1], vertical=thrown)).all()
 
 

@@ -10,8 +10,8 @@ import pytest
 
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.polarity import POLARITIES
-from rbfrag.motions.pulses import reversal_pulse
 from rbfrag.motions.readers import read_motions
+from rbfrag.motions.sample_motions import reversal_pulse
 from rbfrag.motions.toppling_spectrum import toppling_spectrum
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.solver.excitation import excitation

@@ -9,8 +9,7 @@ from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.solver.excitation import excitation
 from rbfrag.solver.integrator.batch import simulate_many
 from rbfrag.solver.integrator.toppling_kernel import TOPPLED
-from rbfrag.solver.search.critical import critical
-from rbfrag.solver.search.scan import _gaps
+from rbfrag.solver.search.critical import _gaps, critical
 
 
 @pytest.mark.parametrize("seed", range(4))

@@ -12,10 +12,10 @@ BLOCKS = [(0.1, 0.02), (3.0, 0.1), (30.0, 1.5), (12.0, 5.0)]
 
 @pytest.mark.parametrize(("p2", "kr"), BLOCKS)
 def test_it_has_the_numbers_it_was_made_of(p2, kr):
-    block, found = level_rectangle(p2, kr)
+    block, result = level_rectangle(p2, kr)
     assert block.p2 == pytest.approx(p2, rel=1e-12)
-    assert found.kr == pytest.approx(kr, rel=1e-12)
-    assert (found.mode, found.state) == ("topple", "stable")
+    assert result.kr == pytest.approx(kr, rel=1e-12)
+    assert (result.mode, result.state) == ("topple", "stable")
 
 
 @pytest.mark.parametrize(("p2", "kr"), BLOCKS)

@@ -43,14 +43,14 @@ def test_slumps_against_equilibrium_of_the_turned_block() -> None:
         case = statics.parallelogram(a1, a3, 1.7, beta, phi, phi_back, kv)
         block = Block.from_angles(a1, a3, 1.7)
         theta = random.uniform(0.0, 0.99) * block.gamma_deg
-        found = ks_after_rotation(
+        result = ks_after_rotation(
             block, theta, beta_deg=beta, phi_deg=phi, phi_back_deg=phi_back, kv=kv
         )
         r_base, r_back, k = statics.slump(turned_case(case, theta))
-        if math.isfinite(found):
+        if math.isfinite(result):
             assert r_base > 0.0
             assert r_back > 0.0
-            assert found == pytest.approx(k, rel=1e-10, abs=1e-10)
+            assert result == pytest.approx(k, rel=1e-10, abs=1e-10)
         else:
             assert min(r_base, r_back) <= 0.0
 
@@ -66,21 +66,21 @@ def test_confined_topples_against_equilibrium_of_the_turned_block() -> None:
         case = statics.parallelogram(a1, a3, 0.6, beta, phi, phi_back)
         block = Block.from_angles(a1, a3, 0.6)
         theta = random.uniform(0.0, 0.99) * (block.gamma_deg - 90.0)
-        found = kct_after_rotation(block, theta, beta_deg=beta, phi_deg=phi, phi_back_deg=phi_back)
+        result = kct_after_rotation(block, theta, beta_deg=beta, phi_deg=phi, phi_back_deg=phi_back)
         r_base, r_back, k = statics.confined(turned_case(case, -theta))
-        if math.isfinite(found):
+        if math.isfinite(result):
             finite += 1
             assert r_base > 0.0
             assert r_back > 0.0
-            assert found == pytest.approx(k, rel=1e-10, abs=1e-10)
+            assert result == pytest.approx(k, rel=1e-10, abs=1e-10)
     assert finite > 250
 
 
 def test_toppling_falls_to_zero_at_balance() -> None:
     block = Block.from_angles(-10.0, 25.0, 1.0)
     thetas = np.array([0.0, 5.0, 15.0, 30.0])
-    found = kr_after_rotation(block, thetas, beta_deg=10.0)
-    assert found == pytest.approx(np.tan(np.radians(15.0 - thetas)), abs=1e-14)
+    result = kr_after_rotation(block, thetas, beta_deg=10.0)
+    assert result == pytest.approx(np.tan(np.radians(15.0 - thetas)), abs=1e-14)
     assert kr_after_rotation(block, 15.0, beta_deg=10.0) == pytest.approx(0.0, abs=1e-15)
     # more than 90 degrees past balance the tangent itself would be positive again
     slender = Block.from_angles(-1.0, 1.0 + 1e-3, 1.0)
@@ -138,9 +138,9 @@ def test_which_confined_topples_weaken_as_they_turn() -> None:
 def test_numbers_and_arrays_agree() -> None:
     block = Block.from_angles(45.0, 65.0, 2.0)
     thetas = np.linspace(0.0, block.gamma_deg, 7)
-    found = ks_after_rotation(block, thetas, beta_deg=3.0, phi_deg=30.0)
+    result = ks_after_rotation(block, thetas, beta_deg=3.0, phi_deg=30.0)
     singles = [ks_after_rotation(block, float(t), beta_deg=3.0, phi_deg=30.0) for t in thetas]
-    assert found == pytest.approx(np.array(singles), rel=1e-14)
+    assert result == pytest.approx(np.array(singles), rel=1e-14)
 
 
 @pytest.mark.parametrize(
@@ -175,8 +175,8 @@ def test_a_back_plane_that_turns_with_the_block() -> None:
     expected = {0.0: (0.618, 0.524, 0.491), 0.5: (0.618, 0.570, 0.580), 1.0: (0.618, 0.622, 0.681)}
     for share, values in expected.items():
         for theta, value in zip((0.0, 20.0, 30.0), values, strict=True):
-            found = ks_after_rotation(block, theta, **planes, back_follows=share)
-            assert found == pytest.approx(value, abs=1e-3)
+            result = ks_after_rotation(block, theta, **planes, back_follows=share)
+            assert result == pytest.approx(value, abs=1e-3)
     thetas = np.linspace(0.0, block.gamma_deg, 500)
     turning = ks_after_rotation(block, thetas, **planes, back_follows=1.0)
     assert turning.min() == pytest.approx(0.597, abs=1e-3)
@@ -204,15 +204,15 @@ def test_a_plane_that_follows_altogether_by_three_equations(
     *_, k = np.linalg.solve(
         [[u1[0], u2[0], 1.0], [u1[1], u2[1], 0.0], [*moments, 0.0]], [0.0, 1.0, 0.0]
     )
-    found = function(block, 7.0, beta_deg=0.0, phi_deg=35.0, back_follows=share)
-    assert found == pytest.approx(k, rel=1e-12)
+    result = function(block, 7.0, beta_deg=0.0, phi_deg=35.0, back_follows=share)
+    assert result == pytest.approx(k, rel=1e-12)
 
 
 def test_how_far_a_confined_topple_turns_before_its_plane_lets_it_go() -> None:
     block = Block.from_angles(-40.0, 20.0, 1.0)
-    free = block.gamma_deg - 90.0
-    assert confined_limit_deg(block) == free
-    assert confined_limit_deg(block, back_follows=0.5) == pytest.approx(2.0 * free)
+    free_standing = block.gamma_deg - 90.0
+    assert confined_limit_deg(block) == free_standing
+    assert confined_limit_deg(block, back_follows=0.5) == pytest.approx(2.0 * free_standing)
     assert confined_limit_deg(block, back_follows=1.0) == 180.0 - block.gamma_deg
     with pytest.raises(InputError, match="from 0 to 1"):
         confined_limit_deg(block, back_follows=-0.1)

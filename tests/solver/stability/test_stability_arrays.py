@@ -31,24 +31,24 @@ def test_bit_for_bit_the_scalar_answers(back_fracture: bool) -> None:
     r3, beta = random.uniform(0.1, 10.0, n), random.uniform(-40.0, 40.0, n)
     kv = random.uniform(-0.9, 1.0, n)
     blocks = BlockArray.from_angles(a1, a3, r3)
-    found = stability_arrays(
+    result = stability_arrays(
         blocks, beta_deg=beta, phi_deg=phi, phi_back_deg=phi_back, kv=kv,
         back_fracture=back_fracture,
     )  # fmt: skip
-    assert not found.reason_code.any()
+    assert not result.reason_code.any()
     for i in range(n):
         block = Block.from_angles(a1[i], a3[i], r3[i])
-        one = stability(
+        single = stability(
             block, beta_deg=beta[i], phi_deg=phi[i], phi_back_deg=phi_back[i], kv=kv[i],
             back_fracture=back_fracture,
         )  # fmt: skip
-        assert (found.mode[i], found.state[i]) == (one.mode, one.state)
-        assert found.yield_acceleration[i] == one.yield_acceleration
-        assert found.ky[i] == one.ky
-        assert same(found.kr[i], one.kr)
-        assert same(found.ks[i], one.ks)
-        assert same(found.kct[i], one.kct)
-        assert found.p2[i] == block.p2 == blocks.p2[i]
+        assert (result.mode[i], result.state[i]) == (single.mode, single.state)
+        assert result.yield_acceleration[i] == single.yield_acceleration
+        assert result.ky[i] == single.ky
+        assert same(result.kr[i], single.kr)
+        assert same(result.ks[i], single.ks)
+        assert same(result.kct[i], single.kct)
+        assert result.p2[i] == block.p2 == blocks.p2[i]
         if i > 200:
             continue
         assert blocks.shape_factor[i] == block.shape_factor
@@ -66,24 +66,24 @@ def test_bit_for_bit_with_cohesion(back_fracture: bool) -> None:
     cohesion = 10.0 ** random.uniform(1.0, 6.0, n)
     cohesion[::7] = 0.0
     density, kv = random.uniform(1500.0, 3500.0, n), random.uniform(-0.9, 1.0, n)
-    found = stability_arrays(
+    result = stability_arrays(
         BlockArray.from_angles(a1, a3, r3), beta_deg=beta, phi_deg=phi, phi_back_deg=phi_back,
         kv=kv, back_fracture=back_fracture, cohesion_pa=cohesion, density_kg_m3=density,
     )  # fmt: skip
-    assert not found.reason_code.any()
+    assert not result.reason_code.any()
     for i in range(n):
-        one = stability(
+        single = stability(
             Block.from_angles(a1[i], a3[i], r3[i]), beta_deg=beta[i], phi_deg=phi[i],
             phi_back_deg=phi_back[i], kv=kv[i], back_fracture=back_fracture,
             cohesion_pa=cohesion[i], density_kg_m3=density[i],
         )  # fmt: skip
-        assert (found.mode[i], found.state[i]) == (one.mode, one.state)
-        assert found.yield_acceleration[i] == one.yield_acceleration
-        assert found.ky[i] == one.ky
-        assert found.toe_lifts[i] == any("toe lifts" in text for text in one.warnings)
+        assert (result.mode[i], result.state[i]) == (single.mode, single.state)
+        assert result.yield_acceleration[i] == single.yield_acceleration
+        assert result.ky[i] == single.ky
+        assert result.toe_lifts[i] == any("toe lifts" in text for text in single.warnings)
     if back_fracture:
-        assert {*found.mode} == {"slide", "topple", "slump", "confined_topple"}
-        assert found.toe_lifts.any()
+        assert {*result.mode} == {"slide", "topple", "slump", "confined_topple"}
+        assert result.toe_lifts.any()
 
 
 def test_no_cohesion_leaves_every_bit() -> None:
@@ -102,12 +102,12 @@ def test_cohesion_that_cannot_be() -> None:
     planes = {"beta_deg": 0.0, "phi_deg": 35.0, "cohesion_pa": 1e3}
     assumed = stability_arrays(blocks, **planes)
     assert assumed.ky == stability_arrays(blocks, **planes, density_kg_m3=2650.0).ky
-    found = stability_arrays(
+    result = stability_arrays(
         blocks, beta_deg=0.0, phi_deg=35.0, cohesion_pa=[-1.0, 1.0, math.inf, 1.0],
         density_kg_m3=[2700.0, 0.0, 2700.0, 2700.0],
     )  # fmt: skip
-    assert ["cohesion" in reason for reason in found.reason] == [True, True, True, False]
-    assert np.isfinite(found.yield_acceleration).tolist() == [False, False, False, True]
+    assert ["cohesion" in reason for reason in result.reason] == [True, True, True, False]
+    assert np.isfinite(result.yield_acceleration).tolist() == [False, False, False, True]
 
 
 def test_fractures_bit_for_bit() -> None:
@@ -115,13 +115,13 @@ def test_fractures_bit_for_bit() -> None:
     s1, s2 = random.uniform(0.1, 3.0, (2, 500))
     gamma = random.uniform(1.0, 179.0, 500)
     blocks = BlockArray.from_fractures(s1, s2, gamma)
-    found = stability_arrays(blocks, beta_deg=10.0, phi_deg=35.0)
+    result = stability_arrays(blocks, beta_deg=10.0, phi_deg=35.0)
     for i in range(500):
         block = Block.from_fractures(s1[i], s2[i], gamma[i])
-        one = stability(block, beta_deg=10.0, phi_deg=35.0)
-        assert found.yield_acceleration[i] == one.yield_acceleration
-        assert found.mode[i] == one.mode
-        assert found.p2[i] == block.p2
+        single = stability(block, beta_deg=10.0, phi_deg=35.0)
+        assert result.yield_acceleration[i] == single.yield_acceleration
+        assert result.mode[i] == single.mode
+        assert result.p2[i] == block.p2
         assert blocks.alpha1_deg[i] == pytest.approx(block.alpha1_deg, rel=1e-14)
 
 
@@ -129,12 +129,12 @@ def test_shapes_broadcast() -> None:
     blocks = BlockArray.from_angles(np.array([[-10.0], [5.0]]), np.array([20.0, 40.0, 60.0]), 1.0)
     assert blocks.shape == (2, 3)
     assert blocks.size == 6
-    found = stability_arrays(blocks, beta_deg=np.zeros((4, 1, 1)), phi_deg=35.0)
-    assert found.mode.shape == (4, 2, 3)
-    assert found.p2.shape == (4, 2, 3)
+    result = stability_arrays(blocks, beta_deg=np.zeros((4, 1, 1)), phi_deg=35.0)
+    assert result.mode.shape == (4, 2, 3)
+    assert result.p2.shape == (4, 2, 3)
     single = stability_arrays(BlockArray.from_angles(5.0, 40.0, 1.0), beta_deg=0.0, phi_deg=35.0)
     assert single.mode.shape == ()
-    assert single.yield_acceleration == found.yield_acceleration[0, 1, 1]
+    assert single.yield_acceleration == result.yield_acceleration[0, 1, 1]
     assert stability_arrays(
         BlockArray.from_angles([], [], []), beta_deg=0.0, phi_deg=35.0
     ).mode.shape == (0,)
@@ -144,13 +144,13 @@ def test_pieces_join_without_a_seam() -> None:
     random = np.random.default_rng(8)
     n = 2 * CHUNK + 3
     a1, a3 = np.sort(random.uniform(-80.0, 80.0, (2, n)), axis=0)
-    whole = stability_arrays(BlockArray.from_angles(a1, a3, 1.0), beta_deg=5.0, phi_deg=30.0)
+    complete = stability_arrays(BlockArray.from_angles(a1, a3, 1.0), beta_deg=5.0, phi_deg=30.0)
     for piece in (slice(0, 7), slice(CHUNK - 3, CHUNK + 3), slice(n - 4, n)):
         part = stability_arrays(
             BlockArray.from_angles(a1[piece], a3[piece], 1.0), beta_deg=5.0, phi_deg=30.0
         )
-        assert (part.yield_acceleration == whole.yield_acceleration[piece]).all()
-        assert (part.p2 == whole.p2[piece]).all()
+        assert (part.yield_acceleration == complete.yield_acceleration[piece]).all()
+        assert (part.p2 == complete.p2[piece]).all()
 
 
 def test_what_is_no_block_is_nan_with_its_reason() -> None:
@@ -162,18 +162,18 @@ def test_what_is_no_block_is_nan_with_its_reason() -> None:
     for reason, word in zip(blocks.reason, words, strict=True):
         assert word in reason
         assert bool(reason) == bool(word)
-    found = stability_arrays(blocks, beta_deg=0.0, phi_deg=35.0)
-    assert found.reason.tolist() == blocks.reason.tolist()
-    assert found.mode.tolist() == ["slide"] + [""] * 7
-    assert found.state.tolist() == ["stable"] + [""] * 7
-    for values in (found.yield_acceleration, found.ky, found.kr, found.p2):
+    result = stability_arrays(blocks, beta_deg=0.0, phi_deg=35.0)
+    assert result.reason.tolist() == blocks.reason.tolist()
+    assert result.mode.tolist() == ["slide"] + [""] * 7
+    assert result.state.tolist() == ["stable"] + [""] * 7
+    for values in (result.yield_acceleration, result.ky, result.kr, result.p2):
         assert np.isnan(values[1:]).all()
-    assert np.isfinite(found.p2[0])
+    assert np.isfinite(result.p2[0])
 
 
 def test_planes_that_cannot_be_have_their_reason() -> None:
     blocks = BlockArray.from_angles(np.full(6, 10.0), 40.0, 1.0)
-    found = stability_arrays(
+    result = stability_arrays(
         blocks,
         beta_deg=[0.0, 90.0, 0.0, 0.0, 0.0, math.nan],
         phi_deg=[35.0, 35.0, 90.0, 35.0, 35.0, 35.0],
@@ -181,10 +181,10 @@ def test_planes_that_cannot_be_have_their_reason() -> None:
         kv=[0.0, 0.0, 0.0, 0.0, -1.0, 0.0],
     )
     words = ["", "beta_deg", "phi_deg", "phi_back_deg", "kv", "beta_deg"]
-    for reason, word in zip(found.reason, words, strict=True):
+    for reason, word in zip(result.reason, words, strict=True):
         assert word in reason
-    assert found.mode.tolist() == ["slide", "", "", "", "", ""]
-    assert np.isnan(found.yield_acceleration[1:]).all()
+    assert result.mode.tolist() == ["slide", "", "", "", "", ""]
+    assert np.isnan(result.yield_acceleration[1:]).all()
     for number in ({"beta_deg": 95.0, "phi_deg": 35.0}, {"beta_deg": 0.0, "phi_deg": math.nan}):
         assert (stability_arrays(blocks, **number).mode == "").all()  # type: ignore[arg-type]
     with pytest.raises(InputError, match="element 1: beta_deg"):

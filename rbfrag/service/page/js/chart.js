@@ -181,10 +181,10 @@ export function designChart(place, moved) {
       .attr("class", side > 0 ? "beside" : "beside before")
       .attr("x", side * 14)
       .text(probability === null ? "" : percent(probability));
-    const beside = [px + side * BESIDE, py];
+    const labelEnd = [px + side * BESIDE, py];
     return (at) =>
       !touch(at, [px, py]) &&
-      !touch(at, beside) &&
+      !touch(at, labelEnd) &&
       !(at[1] > py && Math.abs(at[0] - px) < LABEL[0] / 2) &&
       !(at[0] < px && Math.abs(at[1] - py) < LABEL[1] / 2);
   }

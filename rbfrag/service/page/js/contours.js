@@ -85,8 +85,8 @@ export function labelsOf(areas, x, y, free) {
       const across = (px - left) / (right - left);
       const up = (py - bottom) / (top - bottom);
       if (across < 0.06 || across > 0.94 || up < 0.04 || up > 0.96) continue;
-      const beside = Math.abs(across + up - wanted);
-      if (beside < least) [least, best] = [beside, [px, py]];
+      const distance = Math.abs(across + up - wanted);
+      if (distance < least) [least, best] = [distance, [px, py]];
     }
     return best;
   }

@@ -1,8 +1,8 @@
-/** The fields of the form: texts in, texts out, and what is wrong beside the field. */
+/** The fields of the form: texts in, texts out, and what is wrong next to the field. */
 
 import { plain } from "./numbers.js";
 import { byId } from "./page.js";
-import { BLOCK_FIELDS, DEFAULTS, FURTHER, MEASURES, MODEL_FIELDS } from "./question.js";
+import { BLOCK_FIELDS, DEFAULTS, ERROR_FIELDS, FURTHER, MEASURES, MODEL_FIELDS } from "./question.js";
 import { quantityNamed } from "./vocabulary.js";
 
 /**
@@ -11,6 +11,7 @@ import { quantityNamed } from "./vocabulary.js";
  */
 
 const NAMES = [
+  ...Object.values(ERROR_FIELDS).flat(), // before the fields that their names begin with
   ...[...Object.values(BLOCK_FIELDS).flat(), "restitution", "displacement"],
   ...[...MEASURES, ...MODEL_FIELDS, "units", "dt", "trace"],
 ];
@@ -53,6 +54,7 @@ export function formFields(form, changed) {
     }
     const { values } = question;
     if (FURTHER.some((name) => values[name])) open(byId("more-shaking"));
+    if (ERROR_FIELDS[shape].some((name) => values[name])) open(byId("errors-part"));
     if (values.model || values.sites || values.level !== DEFAULTS.level) open(byId("model-part"));
     const { kind } = question.values;
     for (const radio of radios("shape")) radio.checked = radio.value === shape;
@@ -134,7 +136,7 @@ export function inLabels(sentence) {
 }
 
 /**
- * Say what is wrong beside the field that the sentence names, or in a place for the rest.
+ * Show the error next to the field that the sentence names, or in a place for the rest.
  * @param {string} sentence
  * @param {HTMLElement} elsewhere
  */

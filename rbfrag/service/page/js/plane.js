@@ -102,10 +102,10 @@ export function rowsOf(plane) {
 function lines([low, high], edges, count) {
   const from = low / BEYOND;
   const to = high * BEYOND;
-  const beside = edges
+  const nearEdges = edges
     .filter((edge) => edge > from && edge < to)
     .flatMap((edge) => [edge * (1 - BESIDE), edge, edge * (1 + BESIDE)]);
-  return [...ratios(from, to, count), ...beside].sort((a, b) => a - b);
+  return [...ratios(from, to, count), ...nearEdges].sort((a, b) => a - b);
 }
 
 /**

@@ -16,6 +16,14 @@ export const BLOCK_FIELDS = {
   fractures: ["s1", "s2", "gamma", "beta", "phi", "water"],
 };
 
+/** Standard deviations of the fields of a shape, which only its probability is asked with. */
+export const ERROR_FIELDS = {
+  rectangle: ["height_sigma", "width_sigma", "dip_sigma", "phi_sigma"],
+  numbers: [],
+  angles: ["alpha1_sigma", "alpha3_sigma", "r3_sigma", "beta_sigma", "phi_sigma"],
+  fractures: ["s1_sigma", "s2_sigma", "gamma_sigma", "beta_sigma", "phi_sigma"],
+};
+
 /** By which of its fields an address names a shape. */
 const OWN_FIELDS = /** @type {[Shape, string[]][]} */ ([
   ["angles", ["alpha1", "alpha3", "r3"]],
@@ -46,6 +54,7 @@ export const DEFAULTS = {
   beta: "18",
   phi: "",
   water: "",
+  ...Object.fromEntries(Object.values(ERROR_FIELDS).flat().map((name) => [name, ""])),
   kind: "",
   restitution: "",
   displacement: "0.1",
@@ -103,7 +112,8 @@ function blockFields({ shape, values }) {
  */
 export function asked({ shape, values }) {
   const free = values.kind ? ["kind", "restitution"] : [];
-  const names = [...blockFields({ shape, values }), ...free, "displacement", ...MEASURES, ...MODEL_FIELDS];
+  const errors = ERROR_FIELDS[shape];
+  const names = [...blockFields({ shape, values }), ...errors, ...free, "displacement", ...MEASURES, ...MODEL_FIELDS];
   const given = only(values, names);
   for (const name of /** @type {const} */ (["level", "displacement"])) {
     if (given[name] === DEFAULTS[name]) delete given[name];

@@ -3,7 +3,7 @@
 import { get, post, upload } from "./ask.js";
 import { fromField } from "./numbers.js";
 import { columnsOf, rowsOf, stepsOf } from "./plane.js";
-import { blockOf, MEASURES, MODEL_FIELDS, only } from "./question.js";
+import { blockOf, ERROR_FIELDS, MEASURES, MODEL_FIELDS, only } from "./question.js";
 import { SIZES, spectrumOf } from "./record.js";
 
 /**
@@ -38,7 +38,7 @@ export function askProbability(question, kind) {
   const names = [...MEASURES, ...MODEL_FIELDS];
   return get("v1/predict", {
     ...{ ...block, ...free, kind },
-    ...only(question.values, [...optionsOf(kind), ...names]),
+    ...only(question.values, [...ERROR_FIELDS[question.shape], ...optionsOf(kind), ...names]),
     text: "true",
   });
 }

@@ -1,4 +1,4 @@
-/** An SVG sheet as wide as its place, drawn anew when that changes. */
+/** An SVG sheet as wide as its place, drawn again when that changes. */
 
 import { d3 } from "./d3.js";
 

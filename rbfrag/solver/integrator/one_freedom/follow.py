@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 
@@ -19,17 +18,21 @@ from rbfrag.solver.integrator.one_freedom.equation import (
     Pose,
 )
 from rbfrag.solver.integrator.one_freedom.run import run_phase
-from rbfrag.solver.integrator.one_freedom.state import (
+from rbfrag.solver.integrator.one_freedom.step import (
     AT_REST,
     COMES_TO_REST,
+    CONDITIONS,
     ENDLESS,
     JUMPED,
     LEAVES,
     LOWER,
     NO_REVERSE,
+    ORDER,
     REVERSE,
     REVERSE_LEAVES,
     REVERSE_MOVES,
+    TURN_MAX,
+    UNIFORM_ORDER,
     UPPER,
     VIOLATED,
     Entry,
@@ -37,10 +40,9 @@ from rbfrag.solver.integrator.one_freedom.state import (
     PhaseRun,
     PhaseWork,
 )
-from rbfrag.solver.integrator.one_freedom.step import CONDITIONS, ORDER, TURN_MAX, UNIFORM_ORDER
 from rbfrag.solver.integrator.state import Peak, Place
 from rbfrag.solver.quantity import finite_or_none
-from rbfrag.solver.results import FloatArray, Outcome
+from rbfrag.solver.results import FloatArray, ModeChange, Outcome
 
 PHASES_MAX = 1000
 """Changes of phase in one run beyond which the model must be wrong."""
@@ -49,22 +51,9 @@ MOST_STEPS = 1e8
 """Steps of one run beyond which the size of the block cannot be meant."""
 
 _NO_ROWS = np.empty((4, 0))
-_NO_CONDITIONS = np.empty((0, 3))
 
-FROM_REST = Entry(Place(0, 0.0), 0.0, 0.0, 0.0, 0.0, 0.0)
-"""A block at rest at x = 0 when the record begins."""
-
-
-class Change(NamedTuple):
-    """A change of phase.
-
-    Args:
-        time_s: when [s].
-        name: what the block does from then on.
-    """
-
-    time_s: float
-    name: str
+AT_BEGIN = Place(0, 0.0)
+"""Where the record begins."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,7 +113,7 @@ class MechanismRun:
     error: float
     steps: int
     samples_moved: int
-    changes: tuple[Change, ...]
+    changes: tuple[ModeChange, ...]
     sentences: tuple[str, ...]
     phase: Phase
     ending: str
@@ -137,7 +126,6 @@ def follow(
     *,
     history: bool = False,
     turn_max: float = TURN_MAX,
-    order: int = ORDER,
     start: tuple[float, float] = (0.0, 0.0),
 ) -> MechanismRun:
     """Run a mechanism from rest under one excitation until motion has ended.
@@ -146,28 +134,42 @@ def follow(
         excitation: accelerations at nodes.
         history: keep the motion in time.
         turn_max: greatest step, in units of the block's own time; for convergence studies.
-        order: order of the method; for convergence studies.
         start: position in the first phase at which it rests, and the bound on its error.
 
     Raises:
         InputError: a block so small that the run would not end in reasonable time.
     """
-    _reject_endless(mechanism, excitation, turn_max)
+    equation = mechanism.first.forward
+    # an exact step needs no division, whatever the size of the block
+    if not equation.uniform:
+        expected = equation.frequency_at_rest * excitation.duration_s / turn_max
+        if expected > MOST_STEPS:
+            raise InputError(
+                f"the block is so small that one run would take {expected:.1g} steps over this "
+                "record: check the unit of its size, which is in metres"
+            )
     # A run is a chain of phases. Each is one initial value problem of one coordinate x, from
     # `entry` (position, rate and their error bounds at a time of the record) to the event that ends
     # it; its end is the entry of the next phase, error bounds included
     record = excitation.nodes
-    phase, entry = mechanism.first, FROM_REST._replace(x=start[0], error_x=start[1])
-    changes: list[Change] = []
-    histories: list[MotionHistory] = []
+    phase, entry = mechanism.first, Entry(AT_BEGIN, 0.0, start[0], 0.0, start[1], 0.0)
+    changes: list[ModeChange] = []
+    parts: list[tuple[Phase, FloatArray]] = []
     steps = samples_moved = impacts = 0
     started = ended = math.nan
     peak, slipped = Peak(0.0, 0.0), 0.0
     while True:
-        rows = _empty_rows(excitation) if history else _NO_ROWS
+        # nodes, a start, a turn and a standstill in each interval, and the free motion after it
+        rows = np.empty((4, 6 * excitation.time_s.size + 20_000)) if history else _NO_ROWS
         # each phase has equations and limits of its own; the record and the entry go on
-        rules = _rules(phase, turn_max, order)
-        run = run_phase(record, rules, entry, _work(rules), rows)
+        rules = _rules(phase, turn_max)
+        # conditions that depend on x are taken at each step: they need no work array
+        conditions = (
+            np.empty(((len(table) - CONDITIONS) // 3 if rules.uniform else 0, 3))
+            for table in (rules.forward, rules.reverse)
+        )
+        work = PhaseWork(np.empty((8, rules.order + 1)), *conditions)
+        run = run_phase(record, rules, entry, work, rows)
         entry = run.end
         steps += run.steps
         samples_moved += run.samples_moved
@@ -181,7 +183,8 @@ def follow(
         if run.peak.x != entry.x:
             slipped = max(slipped, phase.pose(run.peak.x).displacement_m)
         if history:
-            histories.append(_history(phase, rows[:, : run.history_length], run))
+            last = [[run.time_s], [run.end.x], [run.end.rate]]
+            parts.append((phase, np.append(rows[:3, : run.history_length], last, axis=1)))
         # the model says what follows a limit; every other stop ends the run
         if run.stop in _REASONS:
             end = run.end
@@ -199,7 +202,7 @@ def follow(
         if len(changes) >= PHASES_MAX:
             following = Ending(Outcome.UNDETERMINED, "the motion changes without end")
             break
-        changes.append(Change(run.time_s, following.name))
+        changes.append(ModeChange(run.time_s, following.name))
         phase = following
     sentences = list(mechanism.warnings)
     # what was taken for granted is told only where the run made use of it
@@ -226,11 +229,11 @@ def follow(
         sentences=tuple(sentences),
         phase=phase,
         ending=following.sentence,
-        history=_joined(histories) if history else None,
+        history=_history(parts) if history else None,
     )
 
 
-def _rules(phase: Phase, turn_max: float, order: int) -> PhaseRules:
+def _rules(phase: Phase, turn_max: float) -> PhaseRules:
     in_reverse = NO_REVERSE
     if phase.reverse is not None:
         in_reverse = REVERSE_LEAVES if phase.leaves_in_reverse else REVERSE_MOVES
@@ -246,20 +249,9 @@ def _rules(phase: Phase, turn_max: float, order: int) -> PhaseRules:
         float(phase.highest),
         COMES_TO_REST if phase.impact == "comes to rest" else LEAVES,
         uniform,
-        UNIFORM_ORDER if uniform else order,
+        UNIFORM_ORDER if uniform else ORDER,
         turn_max,
     )
-
-
-def _work(rules: PhaseRules) -> PhaseWork:
-    series = np.empty((8, rules.order + 1))
-    # conditions that depend on x are taken at each step: they need no work array
-    if not rules.uniform:
-        return PhaseWork(series, _NO_CONDITIONS, _NO_CONDITIONS)
-    forward, reverse = (
-        np.empty(((len(table) - CONDITIONS) // 3, 3)) for table in (rules.forward, rules.reverse)
-    )
-    return PhaseWork(series, forward, reverse)
 
 
 def _doubted(ending: Ending, phase: Phase, run: PhaseRun) -> Ending:
@@ -310,40 +302,10 @@ def _ending(phase: Phase, run: PhaseRun, last: int) -> Ending:
 _REASONS: dict[int, ExitReason] = {UPPER: "upper", LOWER: "lower", REVERSE: "reverse"}
 
 
-def _empty_rows(excitation: Excitation) -> FloatArray:
-    # nodes, a start, a turn and a standstill in each interval, and the free motion after it
-    return np.empty((4, 6 * excitation.time_s.size + 20_000))
-
-
-def _history(phase: Phase, rows: FloatArray, run: PhaseRun) -> MotionHistory:
-    """Return the recorded history of one phase, and the state at its end."""
-    time_s = np.append(rows[0], run.time_s)
-    x = np.append(rows[1], run.end.x)
-    rate = np.append(rows[2], run.end.rate)
-    # the strength left, drawn beside k_h: where it is below, the block speeds up
-    strength = np.array([phase.forward.threshold(float(value)) for value in x])
-    return MotionHistory(time_s, x, rate, strength, tuple(phase.pose(float(value)) for value in x))
-
-
-def _joined(parts: list[MotionHistory]) -> MotionHistory:
-    return MotionHistory(
-        np.concatenate([part.time_s for part in parts]),
-        np.concatenate([part.x for part in parts]),
-        np.concatenate([part.rate for part in parts]),
-        np.concatenate([part.strength_g for part in parts]),
-        tuple(pose for part in parts for pose in part.poses),
-    )
-
-
-def _reject_endless(mechanism: Mechanism, excitation: Excitation, turn_max: float) -> None:
-    equation = mechanism.first.forward
-    # an exact step needs no division, whatever the size of the block
-    if equation.uniform:
-        return
-    duration_s = float(excitation.time_s[-1] - excitation.time_s[0])
-    steps = equation.frequency_at_rest * duration_s / turn_max
-    if steps > MOST_STEPS:
-        raise InputError(
-            f"the block is so small that one run would take {steps:.1g} steps over this record: "
-            "check the unit of its size, which is in metres"
-        )
+def _history(parts: list[tuple[Phase, FloatArray]]) -> MotionHistory:
+    """Return the recorded history of a run, from time, x and x' in each of its phases."""
+    time_s, x, rate = np.concatenate([rows for _, rows in parts], axis=1)
+    at = [(phase, value) for phase, rows in parts for value in rows[1].tolist()]
+    # the remaining strength, drawn together with k_h: where it is below, the block speeds up
+    strength = np.array([phase.forward.threshold(value) for phase, value in at])
+    return MotionHistory(time_s, x, rate, strength, tuple(phase.pose(value) for phase, value in at))

@@ -1,1 +1,0 @@
-"""Executors of a campaign: processes of this machine, or a Dask cluster."""

@@ -1,1 +1,0 @@
-"""Checks of a database for altered, missing or contradictory rows."""

@@ -1,1 +1,0 @@
-"""Jobs of the OpenQuake engine: its exports and its datastore."""

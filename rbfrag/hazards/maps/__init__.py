@@ -1,1 +1,0 @@
-"""Failures of the blocks on a map of shaking in one earthquake."""

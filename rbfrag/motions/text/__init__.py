@@ -1,1 +1,0 @@
-"""Fields, columns and times in text files."""

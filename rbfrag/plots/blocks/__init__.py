@@ -1,1 +1,0 @@
-"""Figures of blocks and of the planes that bound them."""
