@@ -35,8 +35,8 @@ BLOCKS = (
     "--block docs/examples/block-fractures.toml",
 )  # fmt: skip
 SHAKING = (
-    "--pgv .6", "--pgv 60cm/s --pga .4g", "--pga .5 --tm .5", "--pga .4 --sa10 .3",
-    "--pgv .6 --pga .5 --sa10 .4 --sa30 .1 --sa03 .9",
+    "--pgv .6", "--pgv 60cm/s --pga .4g", "--pga .5 --tm .5", "--pga .4 --sa 1=.3",
+    "--pgv .6 --pga .5 --sa 1=.4 --sa 3=.1 --sa .3=.9",
     "--pgv .6 --pga .4 --arias 2 --magnitude 6.5",
     "--pgv .6 --pgv-sigma .4 --component rotd50", "--pgv 40 --pga .4 --tm 30",
     "--magnitude 6.8 --rjb 12 --vs30 760 --mechanism reverse --sites 5",

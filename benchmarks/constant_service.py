@@ -22,7 +22,7 @@ ANSWER = {
     "ci_low": 0.058696602740786134,
     "ci_high": 0.43004655864721875,
     "level": 0.95,
-    "model": "bounded-pgv_kr",
+    "model": "toppling-pgv",
 }
 
 app = FastAPI(openapi_url=None)

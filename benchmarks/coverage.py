@@ -1,12 +1,12 @@
-"""How often intervals and ranges hold the truth:  python -m benchmarks.coverage [MODEL...]
+"""Coverage of confidence and prediction intervals:  python -m benchmarks.coverage [MODEL...]
 
-Intervals of P: each fitted model is taken for the truth. Outcomes of all blocks of the grid are
-drawn from it with what blocks of one earthquake share, the model is fitted to them, and the
-intervals of blocks drawn at random are compared with the P that is known.
-Ranges of one earthquake: like blocks, one on each side of all sites of an earthquake left out, or
-of one site, are counted as they fell, and compared with the range of `rbfrag predict --sites`.
-The reference that is shipped has all that is read, --db DATABASE another. --write keeps the tables,
-in docs/evidence/model-choice.md and joint-failures.md.
+Confidence intervals of P: each fitted model is assumed to be true, its spectral velocity exact.
+Outcomes of all blocks of the grid are drawn from it with the dependence within earthquakes, the
+model is fitted to them, and the intervals of random blocks are compared with the known P.
+Prediction intervals for a single earthquake: identical blocks, one on each side of all sites of a
+held-out earthquake, or of one site, are compared with the interval of `rbfrag predict --sites`.
+MODEL is as in benchmarks.joint_failures. The built-in data set has all that is read; --db DATABASE:
+another. --write keeps the tables, in docs/evidence/model-choice.md and joint-failures.md.
 """
 
 from __future__ import annotations
@@ -19,18 +19,18 @@ import pandas as pd
 from numpy.typing import NDArray
 from scipy.special import ndtri, stdtrit
 
-from benchmarks.joint_failures import MODELS, Study
+from benchmarks.joint_failures import LOADINGS, MODELS, Study, loadings_of
 from benchmarks.joint_failures import PAGE as RANGES_PAGE
-from benchmarks.model_choice import Mark, acceptance_table
+from benchmarks.model_aims import Mark, acceptance_table
 from benchmarks.page import ROOT, markdown, parser, write_table
 from rbfrag.db.location import REFERENCE
 from rbfrag.fragility.confidence import ParameterErrors, packed, quantiles_of
-from rbfrag.fragility.dependence import Dependence
+from rbfrag.fragility.dependence import Dependence, Loadings, Shares
 from rbfrag.fragility.fit.likelihood import Binomial, maximise
 from rbfrag.fragility.fit.result import cr3, event_derivatives, jackknife_steps
 from rbfrag.fragility.joint import COMPONENTS, overdispersion, share_range
 from rbfrag.fragility.joint_sampling import JointSampler
-from rbfrag.fragility.method import arrays
+from rbfrag.fragility.method import LinearPredictor, arrays
 
 FloatArray = NDArray[np.float64]
 
@@ -165,7 +165,7 @@ def intervals(
     errors = ParameterErrors(packed(jackknife.tolist()), tuple(map(tuple, steps.tolist())))
     high = np.array([
         reach(naive, normal), reach(cr1, normal), ends[1], reach(jackknife, g - 1.0),
-        errors.half_width([*x.T], quantiles_of(LEVEL), arrays()),
+        errors.half_width(LinearPredictor(0.0, tuple(x.T)), quantiles_of(LEVEL), arrays()),
     ])  # fmt: skip
     low = -high
     low[2] = ends[0]
@@ -210,15 +210,20 @@ def range_coverage(blocks: pd.DataFrame, laws: Mapping[str, Dependence]) -> Rang
     alike = _like_blocks(blocks, sides)
     of_earthquake, of_site = (
         alike.groupby([*label, "p2", "class"])
-        .agg(p=("probability", "mean"), fell=("failed", "mean"), n=("failed", "size"))
+        .agg(
+            p=("probability", "mean"),
+            fell=("failed", "mean"),
+            n=("failed", "size"),
+            **{name: (name, "mean") for name in LOADINGS if name in blocks},
+        )
         .reset_index()
         for label in (["earthquake"], ["earthquake", "site"])
     )
     held = []
     for cells in (of_earthquake, of_site):
         ends = [
-            share_range(p, laws[event], n // sides, LEVEL)
-            for event, p, n in zip(cells["earthquake"], cells["p"], cells["n"], strict=True)
+            share_range(p, law, n // sides, LEVEL)
+            for law, p, n in zip(_laws(cells, laws), cells["p"], cells["n"], strict=True)
         ]
         low, high = np.array(ends).reshape(-1, 2).T
         held.append(float(((cells["fell"] >= low - 1e-9) & (cells["fell"] <= high + 1e-9)).mean()))
@@ -230,12 +235,19 @@ def range_coverage(blocks: pd.DataFrame, laws: Mapping[str, Dependence]) -> Rang
     )
 
 
+def _laws(cells: pd.DataFrame, laws: Mapping[str, Dependence]) -> Iterator[Shares]:
+    """Yield the dependence of the blocks of each cell."""
+    columns = np.broadcast_arrays(*loadings_of(cells), np.zeros(len(cells)))[:-1]
+    for event, *loadings in zip(cells["earthquake"], *columns, strict=True):
+        yield laws[event].shares(Loadings(*loadings))
+
+
 def _bias(cells: pd.DataFrame, laws: Mapping[str, Dependence], sides: int) -> float:
     """Return the greatest standardised difference between what fell and P over the classes."""
     p, n = cells["p"].to_numpy(), cells["n"].to_numpy()
     rho = [
-        float(overdispersion(np.array(probability), laws[event], number // sides))
-        for event, probability, number in zip(cells["earthquake"], p, n, strict=True)
+        float(overdispersion(np.array(probability), law, number // sides))
+        for law, probability, number in zip(_laws(cells, laws), p, n, strict=True)
     ]
     sums = pd.DataFrame({
         "class": cells["class"], "earthquake": cells["earthquake"],
@@ -274,7 +286,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     for name in chosen.models:
         study = Study.of(chosen.db, name)
         ranges[name] = range_coverage(study.blocks, study.laws)
-        if chosen.sets:
+        if chosen.sets and loadings_of(study.blocks).variance.max() == 1.0:
             law = next(iter(study.laws.values()))
             result[name] = coverage(study, law, sets=chosen.sets, seed=chosen.seed)
     tables = {"ranges": range_table(ranges)}

@@ -17,7 +17,7 @@ from benchmarks.page import ROOT
 from rbfrag.db.location import REFERENCE
 from rbfrag.db.model_file import read_models
 from rbfrag.exchange.block_fragility import FLOOR, block_functions
-from rbfrag.fragility.measures import ALONE, TERMS
+from rbfrag.fragility.measures import TERMS
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.fragility.prediction import array_answer
 from rbfrag.solver.results import FloatArray
@@ -42,7 +42,9 @@ def errors(model: FragilityModel, measure: str, levels: int) -> tuple[FloatArray
     ).functions
     both = []
     for i, function in enumerate(functions):
-        assert function.levels is not None
+        if function.levels is None:  # lognormal: exact
+            both.append([0.0, 0.0])
+            continue
         block = {name: values[i] for name, values in numbers.items()}
         x = np.geomspace(function.levels[1], function.levels[-1], 4000)[:-1]
         grid = np.geomspace(function.levels[1], function.levels[-1], levels)
@@ -65,15 +67,16 @@ def main() -> None:
     drawn: dict[str, tuple[FloatArray, FloatArray]] = {}
     for row in read_models(REFERENCE):
         inputs = TERMS[row.term].inputs
-        if len(inputs) > 1 or inputs[0] not in ALONE:
+        measure = inputs[0] if inputs else "sa(1)"
+        if len(inputs) > 1 or measure not in ("pgv_m_s", "sa(1)", "pga_g"):
             continue
         for levels in (80, 40):
-            exported, equal = errors(FragilityModel.from_row(row), inputs[0], levels)
+            exported, equal = errors(FragilityModel.from_row(row), measure, levels)
             print(
                 f"{row.name:16} {levels} levels: {exported.max():.2%}, "
                 f"of equal ratios {equal.max():.0%}", flush=True,
             )  # fmt: skip
-            if levels == 80:
+            if levels == 80 and exported.max() > 0.0:
                 drawn[row.name] = exported, equal
     if options.write:
         draw(drawn)

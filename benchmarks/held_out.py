@@ -1,240 +1,235 @@
-"""Models of toppling fitted to earthquakes, and what they predict for those left out.
+"""Predictions for held-out earthquakes, and their scores.
 
-The studies of model choice, coverage and joint failures start here. A fit sorts its rows by its own
-measure, so that the rows of two fits, or of a fit and of the database, do not stand in one order:
-they are joined by the block that they are about (:class:`Key`), never by number.
+Every model predicts the blocks of each earthquake without it (leave-one-earthquake-out
+cross-validation). Of the toppling and rocking models the coefficients, the regression that
+completes the spectral velocity and its standard deviation all leave the earthquake out.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
-from pathlib import Path
-from typing import Any, NamedTuple
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rbfrag.db.engine import opened_database
-from rbfrag.fragility.fit.data import KR, Y0_OVER_PGV, FitData, FitSource, fit_data, read_source
-from rbfrag.fragility.fit.likelihood import most_likely
-from rbfrag.fragility.fit.maximum_likelihood import OutcomeRows, outcome_rows, parameter_names
-from rbfrag.fragility.fit.result import cr3, jackknife_steps
-from rbfrag.fragility.joint import Placement
+from rbfrag.db.model_file import ModelRow
+from rbfrag.fragility.fit.data import KR, FitData, FitSource, fit_data, read_source
+from rbfrag.fragility.fit.fitting import fit_source
+from rbfrag.fragility.fit.likelihood import Binomial, most_likely
+from rbfrag.fragility.fit.losses import held_out_probabilities
+from rbfrag.fragility.fit.result import CLIP, calibration, cr3, jackknife_steps
+from rbfrag.fragility.fit.stored import regression_of
 from rbfrag.fragility.measures import TERMS
-from rbfrag.fragility.method import Method
+from rbfrag.fragility.method import LOGIT
 from rbfrag.fragility.methods import method_named
-from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
+from rbfrag.fragility.model import FragilityModel
+from rbfrag.vocabulary.spectral import SPECTRUM_PERIODS_S, spectral_name
 
 FloatArray = NDArray[np.float64]
 Labels = NDArray[np.intp]
+Mask = NDArray[np.bool_]
 
-FOLDS = 16
-STEP = float(np.log(Y0_OVER_PGV[1] / Y0_OVER_PGV[0]))
-"""Of the grid of y/PGV, in ln y."""
-
-MODELS = {
-    "pgv": ("bounded", "pgv_kr"),
-    "pgv_pga": ("bounded", "pgv_pga"),
-    "pgv_pga_tm": ("bounded", "pgv_pga_tm"),
-    "record": ("record", "xp"),
-}
-"""Method and term of the four models that the aims are about."""
-
-
-class Key(NamedTuple):
-    """A block of the grid under one side of one motion: what rows are joined by.
-
-    Args:
-        motion: id of the motion in the database.
-        polarity: forward or reverse.
-        p2: squared frequency parameter [1/s²].
-        y: toppling velocity [m/s].
-    """
-
-    motion: int
-    polarity: str
-    p2: float
-    y: float
+MAGNITUDES = (0.0, 5.6, 6.0, 6.5, 7.5, math.inf)
+"""Edges of the magnitude classes."""
 
 
 @dataclass(frozen=True, eq=False)
-class Outcomes:
-    """Blocks of the grid of y/PGV with what they did, all of length n.
+class Predicted:
+    """Predictions for blocks of held-out earthquakes, arrays of shape (n,).
 
     Args:
-        keys: the blocks.
-        failed: 1 or 0; blocks of unknown outcome are left out.
+        p: probability of failure.
+        failed: 1 or 0.
         event: number of the earthquake.
-        site: number of the recording.
-        motion: number of the component.
-        polarity: +1 forward, -1 reverse.
-        fold: number of the fold that the earthquake is held out in.
-        strength: number of y/PGV in its grid.
-        value: measures and block by the name of the formulas.
+        magnitude: of the earthquake, NaN where it is unknown.
+        kr: uplift acceleration coefficient; None for blocks without it.
+        p2: squared frequency parameter [1/s²]; None for blocks without it.
     """
 
-    keys: tuple[Key, ...]
+    p: FloatArray
     failed: FloatArray
     event: Labels
-    site: Labels
-    motion: Labels
-    polarity: Labels
-    fold: Labels
-    strength: Labels
-    value: dict[str, FloatArray]
+    magnitude: FloatArray | None = None
+    kr: FloatArray | None = None
+    p2: FloatArray | None = None
 
-    def joined(self, predicted: Mapping[Key, float]) -> FloatArray:
-        """Return the P of a model at these blocks, NaN where it has none, shape (n,)."""
-        return np.array([predicted.get(key, np.nan) for key in self.keys])
+    @classmethod
+    def of(cls, data: FitData, source: FitSource, p: FloatArray) -> Predicted:
+        """Return the scored blocks of a fit, with P of all of its grid, shape (n, m).
 
-    def placement(self, rows: Labels) -> Placement:
-        """Return where some of the blocks stand."""
-        return Placement(
-            np.log(self.value["p"][rows]), np.log(self.value["y"][rows]),
-            self.event[rows], self.site[rows], self.motion[rows], self.polarity[rows],
-        )  # fmt: skip
+        Blocks above the fitted range of k_r are left out: they are safe, and would flatter a loss.
+        """
+        judged = data.judged
+        chosen = judged.is_known & np.isfinite(p)
+        if "kr" in data.blocks:
+            chosen &= data.grid("kr") <= KR[1]
+        magnitude = source.table.measure("magnitude")[data.combination]
+        event, magnitude = (
+            np.broadcast_to(column[:, None], chosen.shape)[chosen]
+            for column in (data.event, magnitude)
+        )
+        of_block = [
+            data.grid(name)[chosen] if name in data.blocks else None for name in ("kr", "p2")
+        ]
+        return cls(p[chosen], judged.failed[chosen], event, magnitude, *of_block)
+
+    def only(self, chosen: Mask) -> Predicted:
+        """Return a subset of the blocks."""
+        columns = (getattr(self, field.name) for field in fields(self))
+        return Predicted(*(None if column is None else column[chosen] for column in columns))
+
+    def kr_from(self, low: float, high: float = math.inf) -> Predicted:
+        """Return the blocks with k_r from `low` to below `high`."""
+        assert self.kr is not None
+        return self.only((self.kr >= low) & (self.kr < high))
+
+    def of_size(self, p2: float) -> Predicted:
+        """Return the blocks of one size p² [1/s²]."""
+        assert self.p2 is not None
+        return self.only(np.isclose(self.p2, p2))
+
+    def of_magnitude(self, low: float, high: float) -> Predicted:
+        """Return the blocks of the earthquakes of a magnitude class."""
+        assert self.magnitude is not None
+        return self.only((self.magnitude >= low) & (self.magnitude < high))
+
+    @property
+    def loss(self) -> float:
+        """Mean log loss."""
+        return float(log_losses(self.p, self.failed).mean())
+
+    @property
+    def slope(self) -> tuple[float, float]:
+        """Calibration slope with its standard error; NaN where P separates the outcomes."""
+        failed = self.failed > 0.5
+        if not failed.any() or failed.all() or self.p[failed].min() > self.p[~failed].max():
+            return math.nan, math.nan
+        return calibration_slope(self.p, self.failed, self.event)
+
+    @property
+    def intercepts(self) -> list[float]:
+        """Calibration intercept of each magnitude class; positive where P is too low."""
+        parts = [self.of_magnitude(low, high) for low, high in pairwise(MAGNITUDES)]
+        return [
+            calibration(part.p, part.failed, np.ones(part.p.size, dtype=np.bool_)).intercept
+            for part in parts
+        ]
+
+    @property
+    def ratio(self) -> float:
+        """Predicted over observed number of failures."""
+        return float(self.p.sum() / self.failed.sum())
 
 
-def read(path: str | Path) -> tuple[FitSource, Outcomes]:
-    """Return what fits of toppling without vertical motion read, and the blocks of its grid."""
-    with opened_database(path, read_only=True) as engine, engine.connect() as connection:
-        source = read_source(connection)
-    return source, outcomes(source)
+def log_losses(p: FloatArray, failed: FloatArray) -> FloatArray:
+    """Return the log loss of each block; P is clipped at 1e-4 and 1 - 1e-4."""
+    clipped = np.clip(p, CLIP, 1.0 - CLIP)
+    return np.asarray(-np.where(failed > 0.5, np.log(clipped), np.log1p(-clipped)))
 
 
-def outcomes(source: FitSource) -> Outcomes:
-    """Return the blocks of the grid, of known outcome."""
-    table = source.table
-    assert source.recording is not None
-    y = _y_m_s(source)
-    ratio = y / table.pgv_m_s[:, None]
-    within = (ratio > Y0_OVER_PGV[0] * 0.999999) & (ratio < Y0_OVER_PGV[-1] * 1.000001)
-    within &= source.k_over_pga * table.pga_g[:, None] >= KR[0]
-    is_known = np.isfinite(source.failed) & within
-    row = np.nonzero(is_known)[0]
+def clustered_mean(values: FloatArray, event: Labels) -> tuple[float, float]:
+    """Return the mean of finite values and its standard error clustered by earthquake."""
+    finite = np.isfinite(values)
+    values, event = values[finite], event[finite]
+    mean = float(values.mean())
+    sums = np.bincount(event, values - mean)
+    g = np.unique(event).size
+    return mean, float(np.sqrt(g / (g - 1.0) * (sums @ sums)) / values.size)
 
-    def numbers(values: NDArray[np.generic]) -> Labels:
-        return np.unique(values[row], return_inverse=True)[1].astype(np.intp)
 
-    event = numbers(table.event_id.astype(str))
-    measures = {"pgv": table.pgv_m_s, "pga": table.pga_g, "tm": table.tm_s, "p2": table.p2}
-    return Outcomes(
-        keys=tuple(_keys(source, row, y[is_known])),
-        failed=source.failed[is_known],
-        event=event,
-        site=numbers(source.recording),
-        motion=numbers(table.motion_id),
-        polarity=np.where(table.polarity == "forward", 1, -1)[row],
-        fold=folds(event),
-        strength=np.rint(np.log(ratio[is_known] / Y0_OVER_PGV[0]) / STEP).astype(np.intp),
-        value={"y": y[is_known], "p": np.sqrt(table.p2[row])}
-        | {name: column[row] for name, column in measures.items()},
+def calibration_slope(p: FloatArray, failed: FloatArray, event: Labels) -> tuple[float, float]:
+    """Return the slope of the outcomes on the logit of P, and its CR3 standard error.
+
+    1 is perfect; below 1 P is too close to 0 and 1 (over-confident).
+    """
+    clipped = np.clip(p, CLIP, 1.0 - CLIP)
+    columns = np.column_stack([np.ones(p.size), np.log(clipped / (1.0 - clipped))])
+    number = np.unique(event, return_inverse=True)[1].astype(np.intp)
+    rows = Binomial(LOGIT, columns, failed, np.ones(p.size), number)
+    b = most_likely(rows)
+    return float(b[1]), float(np.sqrt(cr3(jackknife_steps(rows, b))[1, 1]))
+
+
+class StoredModels:
+    """Models of a database with the data that they were fitted to.
+
+    Args:
+        path: the database.
+        rows: its models.
+    """
+
+    def __init__(self, path: str, rows: Sequence[ModelRow]) -> None:
+        self.path = path
+        self.rows = {row.name: row for row in rows}
+        self._sources: dict[tuple[str, str], FitSource] = {}
+        self._data: dict[str, FitData] = {}
+
+    def source(self, row: ModelRow) -> FitSource:
+        """Return what the fits of this model's kind read."""
+        method = method_named(row.method)
+        key = row.kind, method.block.points
+        if key not in self._sources:
+            with opened_database(self.path, read_only=True) as engine, engine.connect() as c:
+                self._sources[key] = read_source(c, method.block, kind=row.kind)
+        return self._sources[key]
+
+    def predicted(self, name: str, inputs: Sequence[str] = ()) -> Predicted:
+        """Return the predictions of a model for held-out earthquakes.
+
+        Args:
+            name: of the model.
+            inputs: intensity measures in addition to those that the model requires.
+
+        Raises:
+            RbfragError: the database has no outcomes, or too few motions have the inputs.
+        """
+        row = self.rows[name]
+        source, term, method = self.source(row), TERMS[row.term], method_named(row.method)
+        if method.forms[row.term].velocity is None:
+            fitted = fit_source(source, term, method, kind=row.kind)
+            return Predicted.of(fitted.data, source, fitted.result.held_out)
+        data, names = self.data(row), (*term.inputs, *inputs)
+        p = held_out_probabilities(self.model(row), data, self.spectra(row), names)
+        return Predicted.of(data, source, p)
+
+    def data(self, row: ModelRow) -> FitData:
+        """Return the data of a fit."""
+        if row.name not in self._data:
+            method, term = method_named(row.method), TERMS[row.term]
+            self._data[row.name] = fit_data(self.source(row), method, term, kind=row.kind)
+        return self._data[row.name]
+
+    def spectra(self, row: ModelRow) -> FloatArray:
+        """Return the response spectrum of the motion of each row of a fit [g], shape (n, 21)."""
+        spectra = self.source(row).spectra
+        assert spectra is not None
+        return spectra[self.data(row).combination]
+
+    def model(self, row: ModelRow) -> FragilityModel:
+        """Return a model that regresses its spectral velocity on any measures."""
+        return FragilityModel.from_row(
+            row, regress=lambda row, used: regression_of(row, used, self.path)
+        )
+
+
+def scored_blocks(source: FitSource) -> tuple[dict[str, FloatArray], FloatArray]:
+    """Return block and shaking of the blocks that toppling models are scored on, by the names of
+    the inputs and with the toppling spectrum `xp_m_s`, and which of them fail, each shape (n,).
+    """
+    data = fit_data(source, method_named("toppling"), TERMS["pgv"])
+    chosen = data.judged.is_known
+    columns = {name: source.table.measure(name) for name in ("pgv_m_s", "pga_g", "tm_s", "pgd_m")}
+    columns["xp_m_s"] = source.xp_m_s
+    if source.spectra is not None:
+        columns |= dict(zip(map(spectral_name, SPECTRUM_PERIODS_S), source.spectra.T, strict=True))
+    of_motion = {name: column[data.combination][:, None] for name, column in columns.items()}
+    values = {name: data.grid(name) for name in ("p2", "kr")} | of_motion
+    shape = chosen.shape
+    return (
+        {name: np.broadcast_to(value, shape)[chosen] for name, value in values.items()},
+        data.judged.failed[chosen],
     )
-
-
-def folds(event: Labels) -> Labels:
-    """Return the number of the part that each row's earthquake is in; they are dealt by size."""
-    size = np.bincount(event)
-    fold = np.empty(size.size, dtype=np.intp)
-    fold[np.argsort(-size, kind="stable")] = np.arange(size.size) % FOLDS
-    return np.asarray(fold[event])
-
-
-def _y_m_s(source: FitSource) -> FloatArray:
-    table = source.table
-    per_k = table.pga_g * STANDARD_GRAVITY_M_S2 / np.sqrt(table.p2)
-    return np.asarray(source.k_over_pga * per_k[:, None])
-
-
-def _keys(source: FitSource, row: Labels, y: FloatArray) -> Iterator[Key]:
-    """Yield the keys of blocks of some rows of the source."""
-    table = source.table
-    columns = (table.motion_id[row], table.polarity[row], table.p2[row], y)
-    return map(Key, *(column.tolist() for column in columns))
-
-
-def by_block(
-    source: FitSource, data: FitData, place: Labels, values: NDArray[Any]
-) -> dict[Key, Any]:
-    """Return what a fit says of some blocks, by the block.
-
-    Args:
-        source: what was fitted.
-        data: the rows of the fit.
-        place: flat indices of blocks on its grid, shape (k,).
-        values: what it says of each, shape (k,).
-
-    Raises:
-        ValueError: a block stands there twice.
-    """
-    row = data.combination[place // data.failed.shape[1]]
-    keys = _keys(source, row, data.grid("y_m_s").ravel()[place])
-    result = dict(zip(keys, values.tolist(), strict=True))
-    if len(result) != place.size:
-        raise ValueError(f"{place.size - len(result)} blocks of a fit stand in it twice")
-    return result
-
-
-def predictions(source: FitSource, data: FitData, probability: FloatArray) -> dict[Key, float]:
-    """Return the P of every block of known outcome, given on the grid of a fit, shape (n, m)."""
-    place = np.flatnonzero(data.judged.is_known)
-    return by_block(source, data, place, probability.ravel()[place])
-
-
-@dataclass(frozen=True, eq=False)
-class Study:
-    """A model fitted to all earthquakes, and its predictions of each by a fit to the others.
-
-    Args:
-        name: of the model.
-        data: the rows of the fit.
-        rows: their outcomes with features.
-        b: the parameters, shape (k,).
-        steps: those of leaving each earthquake out, shape (G, k).
-        held_out: P of every block of the study by the fit without its earthquake, shape (n,).
-    """
-
-    name: str
-    data: FitData
-    rows: OutcomeRows
-    b: FloatArray
-    steps: FloatArray
-    held_out: FloatArray
-
-    @property
-    def errors(self) -> FloatArray:
-        """CR3 errors of the parameters, shape (k,)."""
-        return np.sqrt(np.diag(cr3(self.steps)))
-
-    @property
-    def placement(self) -> Placement:
-        """Where the fitted blocks stand."""
-        data, place = self.data, self.rows.place
-        row = place // data.failed.shape[1]
-        assert data.recording is not None
-        return Placement(
-            np.log(data.grid("p").ravel()[place]), np.log(data.grid("y_m_s").ravel()[place]),
-            data.event[row], data.recording[row], data.motion[row],
-            data.polarity[row].astype(np.intp),
-        )  # fmt: skip
-
-
-def studied(source: FitSource, blocks: Outcomes, name: str, method: Method | None = None) -> Study:
-    """Fit a model of outcomes to all earthquakes, and to all but each.
-
-    Args:
-        source: what fits read.
-        blocks: of the study.
-        name: of one of `MODELS`, or of a term where a method is given.
-        method: one that reads outcomes.
-    """
-    if method is None:
-        method, term = method_named(MODELS[name][0]), TERMS[MODELS[name][1]]
-    else:
-        term = TERMS[name]
-    data = fit_data(source, method, term)
-    rows = outcome_rows(data, method, term, parameter_names(method, term))
-    b = most_likely(rows.data)
-    held_out = blocks.joined(predictions(source, data, rows.held_out(b)))
-    return Study(name, data, rows, b, jackknife_steps(rows.data, b), held_out)

@@ -36,7 +36,7 @@ YEARS = 50.0
 
 EXAMPLE = ROOT / "examples" / "pelicun_damage.py"
 DEMANDS = (
-    ("PGV", "pgv_m_s", (0.6, 0.9)), ("PGA", "pga_g", (0.6, 1.2)), ("SA(1.0)", "sa10_g", (0.5, 1.0))
+    ("PGV", "pgv_m_s", (0.6, 0.9)), ("PGA", "pga_g", (0.6, 1.2)), ("SA(1.0)", "sa(1)", (0.5, 1.0))
 )  # fmt: skip
 """What a block with p2 = 3 and kr = 0.1 is shaken by in pelicun."""
 

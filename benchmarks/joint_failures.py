@@ -1,33 +1,41 @@
-"""What falls together in one earthquake:  python -m benchmarks.joint_failures [MODEL...]
+"""Joint failures in one earthquake:  python -m benchmarks.joint_failures [MODEL...]
 
-Estimates the copula of failures from predictions of earthquakes left out, and tests the variance of
-numbers of failures, and whether any block of some rare ones fails, on portfolios of blocks of
-earthquakes that neither the probabilities nor the copula were fitted to. The reference that is
-shipped has all that is read, --db DATABASE another. --write keeps the tables, in
+Estimates the copula of failures from predictions for held-out earthquakes, and tests the variance
+of the number of failures, and P of any failure among rare ones, on portfolios of blocks of
+earthquakes that neither the probabilities nor the copula were fitted to. Where the spectral
+velocity is completed, its regression adds to the copula what it shares. A MODEL is
+the name of a stored model, with intensity measures after a colon if more are given than it
+requires: "toppling-pgv_pga:tm_s", "toppling-pga:sa(0.3),sa(1)"; "exact" for the whole spectrum. The
+built-in data set has all that is read; --db DATABASE: another. --write keeps the tables, in
 docs/evidence/joint-failures.md.
 """
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 from scipy.stats import betabinom
 
+from benchmarks.held_out import StoredModels
 from benchmarks.page import ROOT, markdown, parser, write_table
-from rbfrag.db.engine import opened_database
 from rbfrag.db.location import REFERENCE
-from rbfrag.fragility.dependence import Dependence
-from rbfrag.fragility.fit.data import FitData, fit_data, read_source
+from rbfrag.db.model_file import read_models
+from rbfrag.fragility.dependence import EXACT, Dependence, Loadings
+from rbfrag.fragility.fit.data import FitData
 from rbfrag.fragility.fit.dependence import PairTables, estimate_dependence, observed_blocks
 from rbfrag.fragility.fit.likelihood import most_likely
+from rbfrag.fragility.fit.losses import held_out_probabilities
 from rbfrag.fragility.fit.maximum_likelihood import OutcomeRows, outcome_rows, parameter_names
 from rbfrag.fragility.joint import Placement, count_moments
 from rbfrag.fragility.measures import TERMS
+from rbfrag.fragility.method import BlockParameters, arrays
 from rbfrag.fragility.methods import method_named
 
 FloatArray = NDArray[np.float64]
@@ -35,10 +43,13 @@ Rows = NDArray[np.intp]
 
 PAGE = ROOT / "docs" / "evidence" / "joint-failures.md"
 
+EXACT_SPECTRUM = "exact"
 MODELS = (
-    "bounded-pgv_kr", "bounded-pgv_pga", "bounded-pgv_pga_tm", "bounded-pgv_pga_sa10_sa30",
-    "record-xp",
+    "toppling-pgv", "toppling-pgv_pga:exact", "toppling-pga:exact", "toppling-sa:exact",
+    "record-xp", "toppling-pgv_pga", "toppling-pgv_pga:sa(1)", "toppling-pga:sa(0.3),sa(1),sa(3)",
+    "toppling-pga:tm_s", "toppling-pga",
 )  # fmt: skip
+LOADINGS = tuple(f"of_{name}" for name in Loadings._fields)
 PARAMETERS = tuple(field.name for field in fields(Dependence))
 FOLDS = 16
 RANGES = {"mixed": (0.005, 0.995), "rare": (0.002, 0.15)}
@@ -55,7 +66,7 @@ class Study:
         rows: the fitted outcomes with their features.
         b: the parameters, shape (k,).
         blocks: columns as :class:`~rbfrag.fragility.fit.dependence.ObservedBlocks` has them, of
-            blocks of known outcome.
+            blocks of known outcome, and those of :class:`~rbfrag.fragility.dependence.Loadings`.
         laws: the copula without the fold of each earthquake, by its label.
     """
 
@@ -68,34 +79,65 @@ class Study:
 
     @classmethod
     def of(cls, db: str | Path, name: str) -> Study:
-        """Fit a method to a term, such as ``bounded-pgv_pga``."""
-        method, term = (find(part) for find, part in zip(
-            (method_named, TERMS.__getitem__), name.split("-", 1), strict=True
-        ))  # fmt: skip
-        with opened_database(db, read_only=True) as engine, engine.connect() as connection:
-            source = read_source(connection, method.block)
-        data = fit_data(source, method, term)
+        """Return the study of a stored model, such as ``toppling-pgv_pga:tm_s``."""
+        models = StoredModels(str(db), read_models(db))
+        model_name, _, measures = name.partition(":")
+        row = models.rows[model_name]
+        method, term = method_named(row.method), TERMS[row.term]
+        data = models.data(row)
         rows = outcome_rows(data, method, term, parameter_names(method, term))
         b = most_likely(rows.data)
-        columns = observed_blocks(data, method.block, rows.held_out(b))
-        blocks = pd.DataFrame(dict(columns)).dropna(ignore_index=True)
-        blocks["earthquake"] = blocks["earthquake"].astype(str)
-        return cls(name, data, rows, b, blocks, laws_of_folds(blocks))
+        exact = _frame(data, method.block, rows.held_out(b), EXACT)
+        laws = laws_of_folds(exact.dropna(ignore_index=True))
+        blocks = exact
+        if method.forms[row.term].velocity is not None and measures != EXACT_SPECTRUM:
+            names = (*term.inputs, *re.findall(r"[^,]+", measures))
+            model = models.model(row)
+            p = held_out_probabilities(model, data, models.spectra(row), names)
+            numbers = {n: data.grid(n) for n in (*method.block.names, *method.block.options)}
+            loadings = model.for_inputs(names).loadings(numbers, arrays())
+            blocks = _frame(data, method.block, p, loadings)
+        return cls(name, data, rows, b, blocks.dropna(ignore_index=True), laws)
 
     @property
     def placement(self) -> Placement:
-        """Where the fitted blocks stand."""
+        """Where the fitted blocks are, their spectral velocity known."""
         place, data = self.rows.place, self.data
         row = place // data.failed.shape[1]
         assert data.recording is not None
         p, y = (np.log(data.grid(name).ravel()[place]) for name in ("p", "y_m_s"))
-        side = data.polarity[row].astype(np.intp)
-        return Placement(p, y, data.event[row], data.recording[row], data.motion[row], side)
+        return Placement.of(
+            p, y, earthquake=data.event[row], site=data.recording[row],
+            component=data.motion[row], polarity=data.polarity[row].astype(np.intp),
+        )  # fmt: skip
+
+
+def _frame(
+    data: FitData, block: BlockParameters, held_out: FloatArray, loadings: Loadings
+) -> pd.DataFrame:
+    """Return the blocks of a fit with their probabilities and loadings."""
+    columns = dict(observed_blocks(data, block, held_out))
+    for name, values in zip(LOADINGS, loadings, strict=True):
+        columns[name] = np.broadcast_to(values, data.failed.shape).ravel()
+    blocks = pd.DataFrame(columns)
+    blocks["earthquake"] = blocks["earthquake"].astype(str)
+    return blocks
+
+
+def loadings_of(blocks: pd.DataFrame) -> Loadings:
+    """Return the loadings of some blocks; those of an exact spectral velocity without columns."""
+    if LOADINGS[0] not in blocks:
+        return EXACT
+    return Loadings(*(blocks[name].to_numpy() for name in LOADINGS))
+
+
+def _observed(blocks: pd.DataFrame) -> dict[str, Any]:
+    return {str(n): blocks[n] for n in blocks if n not in LOADINGS}
 
 
 def laws_of_folds(blocks: pd.DataFrame) -> dict[str, Dependence]:
     """Return the copula without each of so many parts of the earthquakes, by earthquake."""
-    tables = PairTables.of(**blocks.to_dict("series"))
+    tables = PairTables.of(**_observed(blocks))
     everything = tables.likeliest()
     by_size = blocks["earthquake"].value_counts().index
     fold = {label: i % FOLDS for i, label in enumerate(by_size)}
@@ -108,10 +150,13 @@ def laws_of_folds(blocks: pd.DataFrame) -> dict[str, Dependence]:
 
 
 def placement_of(blocks: pd.DataFrame) -> Placement:
-    """Return where some blocks of one earthquake stand."""
+    """Return the placement of some blocks of one earthquake."""
     ln_p, ln_y = 0.5 * np.log(blocks["p2"]), np.log(blocks["y_m_s"])
     site, component = (pd.factorize(blocks[name])[0] for name in ("site", "component"))
-    return Placement.of(ln_p, ln_y, site=site, component=component, polarity=blocks["polarity"])
+    return Placement.of(
+        ln_p, ln_y, site=site, component=component, polarity=blocks["polarity"],
+        loadings=loadings_of(blocks),
+    )  # fmt: skip
 
 
 def portfolio(
@@ -221,7 +266,7 @@ def _by_earthquake(study: Study, chosen: pd.Series) -> Iterator[tuple[Dependence
 
 def parameter_row(study: Study) -> list[str]:
     """Return the estimates with their errors."""
-    estimate = estimate_dependence(**study.blocks.to_dict("series"))
+    estimate = estimate_dependence(**_observed(study.blocks))
     cells = [f"{estimate[n]:.2f} ± {estimate['errors'][n]:.2f}" for n in PARAMETERS]
     return [study.name, *cells]
 
@@ -240,7 +285,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parameters, counts, gains = [], [], []
     for name in chosen.models:
         study = Study.of(chosen.db, name)
-        parameters.append(parameter_row(study))
+        if loadings_of(study.blocks).variance.max() == 1.0:
+            parameters.append(parameter_row(study))
         mixed, rare = ([line(study, place, kind) for place in PLACEMENTS] for kind in RANGES)
         counts.append([name, *("" if result is None else cell(result.ratio()) for result in mixed)])
         gains.append(

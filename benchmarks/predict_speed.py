@@ -46,10 +46,14 @@ def main(arguments: Sequence[str] | None = None) -> None:
     report("predict-speed", markdown((head, cells)), write=chosen.write)
 
 
+def _words(model: str, question: dict[str, float]) -> str:
+    return f"{model} with Tm" if "tm_s" in question else model
+
+
 def scalar(db: str, question: dict[str, float]) -> list[list[str]]:
     """Return the rows of a call with single numbers."""
     model = suited_models({**BLOCK, **question}, db)[0]
-    words = f"{model.name}"
+    words = _words(model.name, question)
     rows = []
     for name, call in (
         ("model in hand", lambda: predict(3.0, 0.1, **question, model=model)),
@@ -86,8 +90,8 @@ def array(db: str, question: dict[str, float], rows: int, *, interval: bool) -> 
     ratio = median(wall) / median(ndtr_wall)
     of_cpu = median(cpu) / median(ndtr_cpu)
     return [
-        f"{rows:,} blocks, {model.name}, {'with' if interval else 'without'} interval, wall "
-        "(processor)",
+        f"{rows:,} blocks, {_words(model.name, question)}, "
+        f"{'with' if interval else 'without'} interval, wall (processor)",
         f"{median(wall):.2f} s ({median(cpu):.2f} s)",
         "`scipy.special.ndtr` of as many",
         f"{median(ndtr_wall):.2f} s ({median(ndtr_cpu):.2f} s)",

@@ -1,8 +1,7 @@
-"""Rates of an event set by SA(1.0), and by PGA with and without magnitudes, over those by PGV.
+"""Failure rates from an event set by other intensity measures over those by PGV.
 
 python benchmarks/rates_between_measures.py FOLDER, one job's exports of the OpenQuake engine with
-all these measures. Asked is for PGA with magnitudes a geometric mean within 0.75 to 1.3 and a
-standard deviation of ln of at most 0.35.
+PGV, PGA and SA(1.0).
 """
 
 from __future__ import annotations
@@ -19,8 +18,9 @@ RAREST = 1e-4
 
 ROUTES = {
     "SA(1.0)": {"imt": ("SA(1.0)",)},
-    "PGA and magnitude": {"imt": ("PGA",)},
-    "PGA alone": {"imt": ("PGA",), "model": "bounded-pga"},
+    "PGA": {"imt": ("PGA",)},
+    "PGV and PGA": {"imt": ("PGV", "PGA"), "model": "toppling-pgv_pga"},
+    "PGA and SA(1.0)": {"imt": ("PGA", "SA(1.0)"), "model": "toppling-pga"},
 }
 
 

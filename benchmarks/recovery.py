@@ -21,7 +21,7 @@ from rbfrag.fragility.fit.line import Bins, iterate
 from rbfrag.fragility.fit.maximum_likelihood import outcome_rows, parameter_names
 from rbfrag.fragility.fit.result import cr3, jackknife_steps, left_out
 from rbfrag.fragility.measures import TERMS
-from rbfrag.fragility.method import arrays
+from rbfrag.fragility.method import LinearPredictor, arrays
 from rbfrag.fragility.methods import method_named
 from tests.fragility.conftest import critical_values
 from tests.fragility.outcome_draws import TRUTH, drawn_outcomes
@@ -100,7 +100,10 @@ def main(arguments: Sequence[str] | None = None) -> None:
             errors = ParameterErrors(packed(covariance.tolist()), tuple(map(tuple, steps.tolist())))
             estimates.append((b - truth) / error)
             # of each parameter alone
-            reach.append(errors.half_width([*np.eye(b.size)], LEVEL, arrays()) / error)
+            reach.append(
+                errors.half_width(LinearPredictor(0.0, tuple(np.eye(b.size))), LEVEL, arrays())
+                / error
+            )
         z = np.array(estimates)
         covered = (np.abs(z) <= np.array(reach)).mean(axis=0)
         cells.append([

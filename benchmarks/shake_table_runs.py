@@ -31,6 +31,7 @@ from rbfrag.solver.integrator.rocking_kernel import TOPPLED
 from rbfrag.solver.integrator.state import corner
 from rbfrag.solver.results import NUMERICS_VERSION
 from rbfrag.solver.rocking_run import FreeBlock, simulate
+from rbfrag.vocabulary.spectral import period_of
 
 FloatArray = NDArray[np.float64]
 Labels = NDArray[np.intp]
@@ -83,9 +84,9 @@ class Trials:
         return hashlib.sha256(b"".join(parts)).hexdigest()[:16]
 
     def measured(self, name: str) -> FloatArray:
-        """Return a measure of each filtered trace by its name, `pgv_m_s` or `sa10_g` say."""
-        if name.startswith("sa"):
-            return np.array([motion.spectral_accelerations[name] for motion in self.motions])
+        """Return a measure of each filtered trace by its name, `pgv_m_s` or `sa(1)` say."""
+        if (period_s := period_of(name)) is not None:
+            return np.array([motion.spectral_acceleration(period_s) for motion in self.motions])
         return np.array([getattr(motion, name) for motion in self.motions])
 
     def spectrum_m_s(self) -> FloatArray:

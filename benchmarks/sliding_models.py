@@ -1,8 +1,8 @@
-"""How good the models of sliding blocks are:  python -m benchmarks.sliding_models DATABASE
+"""How well models of sliding blocks predict:  python -m benchmarks.sliding_models DATABASE
 
-Reads the sliding campaign of a database and prints what each model scores on earthquakes left out,
-how far it is off by magnitude, and published regressions on the same rows beside our form; --write
-keeps the tables, in docs/evidence/other-kinds.md or benchmarks/results.
+Reads the sliding campaign of a database and prints the scores of its models for held-out
+earthquakes, their calibration intercepts by magnitude, and published regressions on the same rows;
+--write keeps the tables, in docs/evidence/other-kinds.md or benchmarks/results.
 """
 
 from __future__ import annotations
@@ -10,27 +10,19 @@ from __future__ import annotations
 import argparse
 from collections.abc import Mapping
 
-from benchmarks.model_choice import (
-    MODELS,
-    PAGES,
-    Predicted,
-    loss_cell,
-    magnitude_classes,
-    measures_cell,
-    predicted,
-)
+from benchmarks.held_out import Predicted, StoredModels
+from benchmarks.model_aims import MODELS
+from benchmarks.model_choice import PAGES, loss_cell, magnitude_classes, measures_cell
 from benchmarks.page import markdown, write_table
 from benchmarks.slide_comparison import comparison
-from rbfrag.db.engine import opened_database
-from rbfrag.fragility.fit.data import read_source
-from rbfrag.fragility.methods import method_named
+from rbfrag.db.model_file import read_models
 
 
 def score_table(predictions: Mapping[str, Predicted]) -> str:
     """Return log loss, slope and intercepts of the models, best first."""
     cells = [
-        [f"`{name}`", measures_cell(name), loss_cell(prediction), f"{prediction.slope[0]:.2f}",
-         *(f"{value:+.2f}" for value in prediction.intercepts)]
+        [f"`{name}`", measures_cell(name.removeprefix("sliding-")), loss_cell(prediction),
+         f"{prediction.slope[0]:.2f}", *(f"{value:+.2f}" for value in prediction.intercepts)]
         for name, prediction in sorted(predictions.items(), key=lambda item: item[1].loss)
     ]  # fmt: skip
     classes = [words for words, *_ in magnitude_classes()]
@@ -43,11 +35,11 @@ def main(arguments: list[str] | None = None) -> None:
     options.add_argument("database")
     options.add_argument("--write", action="store_true", help="keep the tables")
     chosen = options.parse_args(arguments)
-    with opened_database(chosen.database, read_only=True) as engine, engine.connect() as connection:
-        source = read_source(connection, method_named("displacement").block)
-    models = {name: aims for name, aims in MODELS.items() if aims.kind == "sliding"}
+    models = StoredModels(chosen.database, read_models(chosen.database))
+    names = [name for name, aims in MODELS.items() if aims.kind == "sliding"]
+    source = models.source(models.rows[names[0]])
     tables = {
-        "sliding-scores": score_table({n: predicted(source, aims) for n, aims in models.items()}),
+        "sliding-scores": score_table({name: models.predicted(name) for name in names}),
         "sliding-one": comparison(source, facing="one"),
         "sliding-either": comparison(source, facing="either"),
     }

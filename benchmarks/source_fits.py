@@ -16,8 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import nnls
 
-from benchmarks.held_out import outcomes
-from benchmarks.model_choice import log_losses
+from benchmarks.held_out import log_losses, scored_blocks
 from benchmarks.page import ROOT, markdown, parser, report
 from rbfrag.db.engine import opened_database
 from rbfrag.db.location import REFERENCE
@@ -28,7 +27,6 @@ from rbfrag.fragility.measures import MEASURES
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.fragility.model_selection import find_model
 from rbfrag.fragility.prediction import array_answer
-from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.plots import canvas
 from rbfrag.plots.canvas import as_written
 from rbfrag.plots.model_lines import failure_line
@@ -56,20 +54,13 @@ def main(arguments: Sequence[str] | None = None) -> None:
         "wls-pgv, bins of equal width": refitted(line, source.table, equal_width),
         "wls-pgv, variance weighted by n/v²": with_weighted_variance(line, source.table),
     }
-    blocks = outcomes(source)
-    of_motion = dict(zip(source.table.motion_id.tolist(), source.table.pgd_m, strict=True))
-    value = blocks.value
-    measures = {
-        "p2": value["p"] ** 2, "kr": value["y"] * value["p"] / STANDARD_GRAVITY_M_S2,
-        "pgv_m_s": value["pgv"], "pga_g": value["pga"], "tm_s": value["tm"],
-        "pgd_m": np.array([of_motion[key.motion] for key in blocks.keys]),
-    }  # fmt: skip
+    measures, failed = scored_blocks(source)
     rows = []
     for name, model in {**models, **refits}.items():
         pgv, inside = within_lines(model, source.table)
         p = probabilities(model, measures)
         is_known = np.isfinite(p)
-        loss = log_losses(np.clip(p[is_known], 1e-4, 1.0 - 1e-4), blocks.failed[is_known])
+        loss = log_losses(np.clip(p[is_known], 1e-4, 1.0 - 1e-4), failed[is_known])
         row = [f"`{name}`" if name in models else name]
         for cells, values, words in (
             (pgv, inside, "{:.1f}"), (measures["pgv_m_s"][is_known], loss, "{:.3f}"),

@@ -41,6 +41,8 @@ LONGEST_NAME = 200
 """Characters; what is longer names nothing, and no figure or table has room for it."""
 
 _LONG_WORD = re.compile(r"(\S{60})\S{140,}")
+_SPECTRAL = r"sa\([\d.]+\)(?:_sigma)?"
+"""Names of spectral accelerations by their periods, which are those of the field ``sa_g``."""
 _BLANKS = re.compile(r"[ \t]*[\r\n\t]\s*")
 # control characters, line separators, and marks that turn the direction of writing around
 _UNPRINTABLE = re.compile(
@@ -75,6 +77,8 @@ def spelled(text: str, fields: Collection[str], spell: Callable[[str], str]) -> 
     if not fields:
         return text
     names = "|".join(sorted(map(re.escape, fields), key=len, reverse=True))
+    if "sa_g" in fields:
+        names += rf"|{_SPECTRAL}"
     # no part of another word, of a path or of a file's name
     pattern = rf"(?<![\w./-])(?:{names})(?![\w/]|[.-]\w)"
     return re.sub(pattern, lambda match: spell(match[0]), text)

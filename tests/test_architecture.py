@@ -333,7 +333,6 @@ def test_figure_and_walk_of_the_documentation_are_those_of_today(
 
 
 OTHER_FACTS = {
-    "fragility/methods/overturning.py": "features of a formula",
     "question/scenario.py": "limits of a published ground-motion model",
 }
 """Where a dict maps measures to what is not theirs."""

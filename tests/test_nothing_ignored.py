@@ -35,6 +35,8 @@ from rbfrag.vocabulary.quantities import (
     parameter_of,
     word_of,
 )
+from rbfrag.vocabulary.spectral import input_of
+from tests.by_period import by_period
 from tests.cli.conftest import Shell
 from tests.cli.conftest import shell as shell
 from tests.service.page.conftest import browser as browser
@@ -111,16 +113,16 @@ CASES: dict[str, tuple[dict[str, Any], Any]] = {
     "pga_g": (SLAB | PGV, 0.5),
     "tm_s": (SLAB | PGV | PGA, 0.6),
     "pgd_m": (SLAB | PGV, 0.1),
-    "sa03_g": (SLAB | {"pga_g": 0.5, "sa10_g": 0.5, "sa30_g": 0.2}, 1.0),
-    "sa10_g": (SLAB | {"sa10_g": 0.5}, 0.7),
-    "sa30_g": (SLAB | {"pga_g": 0.5, "sa10_g": 0.5}, 0.2),
+    "sa(0.3)": (SLAB | {"pga_g": 0.5, "sa(1)": 0.5, "sa(3)": 0.2}, 1.0),
+    "sa(1)": (SLAB | {"sa(1)": 0.5}, 0.7),
+    "sa(3)": (SLAB | {"pga_g": 0.5, "sa(1)": 0.5}, 0.2),
     "arias_m_s": (SLIDE | PGV | PGA, 2.0),
     "magnitude": (SLIDE | PGV | PGA, 7.4),
     "pgv_sigma": (SLAB | PGV, 0.6),
     "pga_sigma": (SLAB | PGV | PGA, 0.6),
-    "sa03_sigma": (SLAB | {"pga_g": 0.5, "sa03_g": 1.0, "sa10_g": 0.5, "sa30_g": 0.2}, 0.6),
-    "sa10_sigma": (SLAB | {"sa10_g": 0.5}, 0.6),
-    "sa30_sigma": (SLAB | {"pga_g": 0.5, "sa10_g": 0.5, "sa30_g": 0.2}, 0.6),
+    "sa(0.3)_sigma": (SLAB | {"pga_g": 0.5, "sa(0.3)": 1.0, "sa(1)": 0.5, "sa(3)": 0.2}, 0.6),
+    "sa(1)_sigma": (SLAB | {"sa(1)": 0.5}, 0.6),
+    "sa(3)_sigma": (SLAB | {"pga_g": 0.5, "sa(1)": 0.5, "sa(3)": 0.2}, 0.6),
     "pgv_tau": (SLAB | PGV | {"pgv_sigma": 0.6}, 0.3),
     "rjb_km": (SLAB | SCENARIO, 8.0),
     "vs30_m_s": (SLAB | SCENARIO, 300.0),
@@ -187,7 +189,10 @@ def changed(name: str) -> dict[str, Any]:
 
 def test_every_field_of_a_question_has_a_case() -> None:
     every = dict.fromkeys((*BLOCK, *MEASURED, *COMMON, *INTENSITY, *SCENE, *SOURCE, *COMPONENT))
-    assert {*every} - {*CASES} == {"block", "gmm"}  # a shape as an object, and a file
+    assert {*every} - {*map(input_of, CASES)} == {
+        "block",
+        "gmm",
+    }  # a shape as an object, and a file
 
 
 @pytest.mark.parametrize("name", CASES)
@@ -219,7 +224,11 @@ def without(question: dict[str, Any], name: str) -> dict[str, Any]:
 def test_an_option_answers_as_the_keyword(shell: Shell, name: str) -> None:
     question = changed(name)
     flags = ["--no-back"] if question.pop("back_fracture", True) is False else []
-    options = [f"{option_of(field)}={value}" for field, value in question.items()]
+    options = [
+        f"{option_of(field)}={text}"
+        for field, value in by_period(question, "=").items()
+        for text in (value if isinstance(value, list) else [value])
+    ]
     expected = from_python(changed(name))
     status = 2 if isinstance(expected, str) else 0
     result = shell("predict", *options, *flags, "--json", expect=status)
@@ -230,22 +239,26 @@ def test_an_option_answers_as_the_keyword(shell: Shell, name: str) -> None:
 @pytest.mark.parametrize("name", CASES)
 def test_requests_answer_as_the_keyword(client: TestClient, name: str) -> None:
     expected = from_python(changed(name))
-    words = {parameter_of(field): value for field, value in changed(name).items()}
+    words = {parameter_of(field): value for field, value in by_period(changed(name), ":").items()}
     if words.pop("no_back", True) is False:
         words["no_back"] = True
-    keywords = changed(name)
+    keywords, texts = by_period(changed(name)), by_period(changed(name), ":")
+    bodies = {parameter_of(field): value for field, value in keywords.items()}
+    bodies |= {field: value for field, value in words.items() if field == "no_back"}
+    bodies.pop("back_fracture", None)
     for ask in (
         lambda: client.get("/v1/predict", params=words),
-        lambda: client.get("/v1/predict", params=keywords),
-        lambda: client.post("/v1/predict", json=words),
+        lambda: client.get("/v1/predict", params=texts),
+        lambda: client.post("/v1/predict", json=bodies),
         lambda: client.post("/v1/predict", json=keywords),
     ):
         answer = ask()
         reply = answer.json().get("probability", answer.json().get("detail"))
         agree(reply, expected, f"{name}: {answer.json()}")
-    lists = {field: [value] if QUANTITIES[field].unit or field in BLOCK
+    lists = {field: {period: [number] for period, number in value.items()}
+             if isinstance(value, dict) else [value] if QUANTITIES[field].unit or field in BLOCK
              else value for field, value in keywords.items()}  # fmt: skip
-    if any(isinstance(value, list) for value in lists.values()):
+    if any(isinstance(value, list | dict) for value in lists.values()):
         answer = client.post("/v1/predict", json=lists)
         document = answer.json()
         reply = document["probability"][0] if answer.status_code == 200 else document["detail"]
@@ -270,7 +283,7 @@ def table_answer(columns: dict[str, list[Any]]) -> float | str:
     return row["reason"] if row["probability"] is None else float(row["probability"])
 
 
-@pytest.mark.parametrize("name", [name for name in CASES if name in COLUMNS])
+@pytest.mark.parametrize("name", [name for name in CASES if input_of(name) in COLUMNS])
 def test_a_column_answers_as_the_keyword_by_each_of_its_names(name: str) -> None:
     question, value = CASES[name]
     expected = from_python(changed(name))
@@ -291,7 +304,7 @@ def rows_of(table: str) -> list[dict[str, str]]:
 def test_pasted_text_answers_as_the_keyword(open_page: Any) -> None:
     opened = open_page("?height=1&width=1&pgv=0.6")
     page = opened.page
-    for name in [name for name in CASES if name in COLUMNS]:
+    for name in [name for name in CASES if input_of(name) in COLUMNS]:
         question, value = CASES[name]
         cell = "no" if name == "back_fracture" else value
         columns = one_row(question, column_of(name), cell, name)

@@ -108,7 +108,7 @@ METHOD = Method(
         ("p2", "kr", "pad_m"), "padded", "kr", "p2", method.NOT_LIFTED, stored={"pad_m": ()}
     ),
     link=method.LOGIT,
-    forms={"pgv": Form(("b0", "b_ln_x_over_y", "b_pad"), _eta, 0)},
+    forms={"pgv": Form(("b0", "b_ln_x_over_y", "b_pad"), _eta)},
     meaning="probability that the block on pads fails",
     fit="outcomes",
 )

@@ -18,7 +18,6 @@ from rbfrag.campaign.summary import CampaignProgress
 from rbfrag.errors import InputError, UnknownFieldError
 from rbfrag.files import as_path
 from rbfrag.fragility.confidence import checked_level
-from rbfrag.fragility.measures import spectral
 from rbfrag.fragility.model import Model
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.polarity import Polarity
@@ -51,6 +50,7 @@ from rbfrag.rockmasses.shaking import (
 )
 from rbfrag.solver.stability.modes import words_of_mode
 from rbfrag.vocabulary.quantities import INTENSITY, QUANTITIES
+from rbfrag.vocabulary.spectral import input_of, spectral_inputs, spectral_names
 
 ALWAYS_SHOWN = ("at_rest", "stays", "unstable")
 """Outcomes that have a column of their own even if there are none."""
@@ -124,7 +124,7 @@ class RockMassAnswer(Result):
         if scenario is not None:
             measures = (
                 f"{QUANTITIES[name].symbol or name} {scenario[name]:g} {QUANTITIES[name].unit}"
-                for name in INTENSITY
+                for name in (*INTENSITY, *spectral_names(scenario))
                 if name in scenario
             )
             yield TextLine("Shaking", ", ".join(text.strip() for text in measures))
@@ -273,7 +273,6 @@ def _failure_tables(shaking: Mapping[str, Any]) -> Iterator[TextTable]:
 class RockMassQuestion(MeasureFields[float | None], total=False):
     """Options of `rockmass`."""
 
-    sa_g: Mapping[float, float] | None
     motion: MotionLike | None
     vertical: MotionLike | None
     polarity: Polarity
@@ -313,8 +312,7 @@ def rockmass(
         pga_g: peak ground acceleration [g].
         tm_s: mean period [s].
         pgd_m: peak ground displacement [m].
-        sa03_g, sa10_g, sa30_g: spectral accelerations [g]; or all of them as sa_g, by
-            their period [s], as in :func:`rbfrag.predict`.
+        sa_g: spectral accelerations [g] by oscillator period [s], as in :func:`rbfrag.predict`.
         arias_m_s: Arias intensity [m/s].
         magnitude: magnitude of the earthquake.
         motion: accelerogram, or its file, that every block is run under in its own mode.
@@ -336,7 +334,7 @@ def rockmass(
         UnknownModelError: no model of that name.
         DatabaseError: the database cannot be read.
     """
-    UnknownFieldError.reject(question, RockMassQuestion, "a rock mass")
+    UnknownFieldError.reject(map(input_of, question), RockMassQuestion, "a rock mass")
     if isinstance(mass, Mapping):
         mass = rock_mass_of_tables(mass)
     elif not isinstance(mass, RockMass):
@@ -347,7 +345,8 @@ def rockmass(
     def of(names: Iterable[str]) -> dict[str, Any]:
         return {name: options[name] for name in names if name in options}
 
-    measures = of(MeasureFields.__annotations__) | spectral(options.get("sa_g", {}))
+    measures = of((*MeasureFields.__annotations__, *spectral_names(options)))
+    measures |= spectral_inputs("sa_g", measures.pop("sa_g", {}))
     level, motion = checked_level(options.get("level", 0.95)), options.get("motion")
     if motion is not None and measures:
         raise InputError(

@@ -38,6 +38,7 @@ from rbfrag.vocabulary.quantities import (
     option_of,
     word_of,
 )
+from rbfrag.vocabulary.spectral import BY_PERIOD
 
 F = TypeVar("F", bound=Callable[..., None])
 
@@ -45,7 +46,7 @@ MOST_USED = (
     "--height", "--width", "--dip", "--phi", "--kind", "--pgv", "--help",
     "--blocks", "--out", "--json", "--plot", "--age", "--hazard", "--imt", "--component",
     "--p2", "--kr", "--ky", "--displacement", "--motion", "--rockmass", "--gmf-data",
-    "--weights", "--years", "--joint", "--magnitude", "--rjb", "--vs30", "--pga", "--sa10",
+    "--weights", "--years", "--joint", "--magnitude", "--rjb", "--vs30", "--pga", "--sa",
     "--sites", "--block", "--db", "--level", "--draws", "--vertical", "--rotation",
     "--age-sd", "--over", "--kr-sigma", "--model", "--units", "--verbose", "--phi-back",
     "--water", "--polygon", "--restitution", "--s1", "--s2", "--gamma",
@@ -120,6 +121,10 @@ class _WithComma(float):
     text: str
 
 
+_KINDS = {bool: bool, str: str | None, dict: list[str] | None}
+"""Types of options by the type of their field; others are numbers."""
+
+
 class Fields:
     """Group of the options of fields of the vocabulary, which gives :class:`Inputs`.
 
@@ -143,12 +148,12 @@ class Fields:
                     options[word] = str | None, file
                 continue
             of_type = INPUTS[name].type
-            kind = bool if of_type is bool else str | None if of_type is str else float | None
+            kind: Any = _KINDS.get(of_type, float | None)
             default = False if of_type is bool else None
             *aliases, first = word_of(name), *(w for w, of in OTHER_WORDS.items() if of == name)
             help = QUANTITIES[name].help(option_of)
             about = {"autocompletion": model_names} if name == "model" else {}
-            metavar = "URL" if name == "db" else None
+            metavar = "URL" if name == "db" else "T=VALUE" if name in BY_PERIOD else None
             options[first] = (
                 kind,
                 option(help, default, rich_help_panel=panel, metavar=metavar, **about),

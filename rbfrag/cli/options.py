@@ -267,7 +267,7 @@ Reading = Annotated[dict[str, Any], _reading]
 
 
 def _curve(
-    imt: str | None = option("Intensity measure of the curve: PGV, PGA, 'SA(1.0)'"),
+    imt: str | None = option("Intensity measure of the curve: PGV, PGA, 'SA(0.5)'"),
     site: str | None = option("Site in the file, by number (from 1) or name"),
     convert: str | None = option(
         "Published conversion of a spectral acceleration to PGV, with its dispersion: "

@@ -126,7 +126,7 @@ def typed_option(name: str) -> str:
 
 
 def print_labelled(label: str, text: str) -> None:
-    """Print a line of an answer with its label: "Model     bounded-pgv_kr, …"."""
+    """Print a line of an answer with its label: "Model     toppling-pgv, …"."""
     print(f"{label:<9} {spelled(text, (), typed_option)}")
 
 

@@ -11,6 +11,7 @@ from collections.abc import Iterator
 from contextlib import closing, contextmanager, suppress
 from os import PathLike
 from pathlib import Path
+from typing import NamedTuple
 
 from sqlalchemy import Connection, Engine, inspect, text
 
@@ -115,14 +116,26 @@ def stored_revision(connection: Connection) -> str | None:
     return sole_revision([*map(str, revisions)], database_label(connection.engine.url))
 
 
-def upgrade_database(db: str | PathLike[str] | None = None) -> tuple[str, str]:
+class Upgrade(NamedTuple):
+    """Result of an upgrade.
+
+    Args:
+        before: the revision before.
+        after: the revision after, the same when there was nothing to do.
+        deleted_models: names of fitted models of forms that are no longer supported.
+    """
+
+    before: str
+    after: str
+    deleted_models: tuple[str, ...] = ()
+
+
+def upgrade_database(db: str | PathLike[str] | None = None) -> Upgrade:
     """Upgrade a database to the current schema, in one transaction.
 
     Args:
         db: a path or an SQLAlchemy URL; None as for :func:`open_database`.
 
-    Returns:
-        The revision before and after; they are equal when there was nothing to do.
     """
     engine = unchecked_engine(locate(db), foreign_keys=False)
     label = database_label(engine.url)
@@ -133,11 +146,20 @@ def upgrade_database(db: str | PathLike[str] | None = None) -> tuple[str, str]:
             raise NotADatabaseError(f"{label} is not an rbfrag database: give another")
         if before not in REVISIONS:
             check_revision(before, label)
-        if before != SCHEMA_REVISION:
-            migrate(engine)
-        return before, SCHEMA_REVISION
+        if before == SCHEMA_REVISION:
+            return Upgrade(before, before)
+        models = _model_names(engine)
+        migrate(engine)
+        remaining = _model_names(engine)
+        deleted = tuple(name for name in models if name not in remaining)
+        return Upgrade(before, SCHEMA_REVISION, deleted)
     finally:
         engine.dispose()
+
+
+def _model_names(engine: Engine) -> list[str]:
+    with engine.connect() as connection:
+        return list(connection.scalars(text("SELECT name FROM fragility_model ORDER BY name")))
 
 
 def migrate(engine: Engine) -> None:

@@ -19,7 +19,7 @@ DEFAULT_NAME = "rbfrag.db"
 REFERENCE = Path(__file__).resolve().parents[1] / "reference" / "reference.db"
 """The database that is shipped with rbfrag, read-only and without samples, if there is one."""
 
-REVISIONS = ("0001", "0002", "0003")
+REVISIONS = ("0001", "0002", "0003", "0004")
 """Every schema revision this rbfrag knows, oldest first."""
 
 SCHEMA_REVISION = REVISIONS[-1]

@@ -21,7 +21,7 @@ from rbfrag.db.keys import ValueType, row_digests
 from rbfrag.db.sqlite_file import check_sqlite_database, connect_sqlite, explained_sqlite_error
 from rbfrag.errors import DatabaseError, InputError, checked_name
 
-MODEL_FORM = 2
+MODEL_FORM = 3
 """The form of the predictors that this rbfrag fits and answers with."""
 
 
@@ -45,6 +45,8 @@ class ModelRow:
         form: which form of its predictor was fitted; only :data:`MODEL_FORM` answers.
         leave_out_steps: change of the parameters when each earthquake is left out, a line each.
         dependence: correlation of the blocks of one earthquake, JSON-able, by parameter.
+        completions: regressions of the spectral velocity that the model reads, as JSON Lines
+            (:func:`rbfrag.fragility.completion.encode_regressions`); they are read when asked for.
     """
 
     name: str
@@ -61,6 +63,7 @@ class ModelRow:
     form: int = MODEL_FORM
     leave_out_steps: tuple[tuple[float, ...], ...] | None = None
     dependence: Mapping[str, object] | None = None
+    completions: str | None = None
 
 
 COLUMNS = tuple(column.name for column in fields(ModelRow))
@@ -192,48 +195,52 @@ def unknown_model(name: str | None, names: Sequence[str], where: str) -> str:
     return f"there is no model {name!r} in {where}; it holds: {', '.join(names)}"
 
 
-DECIDING = ("log_loss_held_out_kr05", "log_loss_held_out")
-"""Scores that models are chosen by: of blocks of k_r >= 0.05, or else of all."""
+ANSWER_ORDER = (
+    "xp", "pgv_pga_ia", "pgv_pga_m", "pgv_pga", "pga", "pgv", "sa", "pga_tm", "pgd_tm",
+)  # fmt: skip
+"""Terms in the order in which their models answer: what says more of the shaking comes first."""
+
+COMPARED = frozenset({"wls", "lognormal", "logistic"})
+"""Methods of the source, of one measure each, that newer ones are compared with: they answer where
+they are named, or where no other does."""
+
+
+def answer_order(row: ModelRow) -> tuple[bool, bool, bool, int, str, str]:
+    """Return the key by which models are sorted that suit a question: the first answers.
+
+    The spectrum X(p) of the record comes first, then the model that was chosen as the default, then
+    the order of methods and terms.
+    """
+    term = ANSWER_ORDER.index(row.term) if row.term in ANSWER_ORDER else len(ANSWER_ORDER)
+    compared = row.method in COMPARED
+    return row.term != "xp", not row.is_default, compared, term, row.created, row.name
 
 
 def held_out_loss(row: ModelRow, *names: str) -> float:
-    """Return the held-out log loss of a model; infinite if it has none.
+    """Return the log loss of a model on earthquakes held out; infinite if it has none.
 
     Args:
-        names: scores, of which the first that there is counts; empty for `DECIDING`.
+        names: scores, of which the first that there is counts; empty for that of blocks of
+            k_r >= 0.05, or else of all.
     """
     scores = row.diagnostics.get("scores")
     score_map = scores if isinstance(scores, Mapping) else {}
-    values = (score_map.get(name) for name in names or DECIDING)
+    names = names or ("log_loss_held_out_kr05", "log_loss_held_out")
+    values = (score_map.get(name) for name in names)
     return next((float(value) for value in values if isinstance(value, int | float)), math.inf)
-
-
-def answers_special_questions(row: ModelRow) -> bool:
-    """Return whether a model uses the record's own spectrum X(p) or is of one rotation limit.
-
-    Such a model answers first where its inputs are given, and is never a default.
-    """
-    return row.term == "xp" or row.diagnostics.get("rotation_deg") is not None
 
 
 def recommended(rows: Sequence[ModelRow], kind: str = "toppling") -> ModelRow | None:
     """Return the default model of a kind, None if there is none.
 
-    That is the one that was chosen, else the one of the least log loss on earthquakes left out,
-    else the one that was fitted first.
+    That is the first in the order of :func:`answer_order` of those that need neither a record nor a
+    rotation limit.
     """
-    of_kind = [row for row in rows if row.kind == kind]
-    return min(
-        of_kind,
-        key=lambda row: (
-            not row.is_default,
-            answers_special_questions(row),
-            held_out_loss(row),
-            row.created,
-            row.name,
-        ),
-        default=None,
-    )
+    usual = [row for row in rows if row.kind == kind]
+    general = [
+        row for row in usual if row.term != "xp" and row.diagnostics.get("rotation_deg") is None
+    ]
+    return min(general or usual, key=answer_order, default=None)
 
 
 def with_defaults(rows: Sequence[ModelRow]) -> list[ModelRow]:

@@ -43,6 +43,13 @@ def store_spectrum(connection: Connection, motion_id: int, ground: GroundMotion)
     insert_if_new(connection, motion_spectrum, {"motion_id": motion_id, **dict(ordinates)})
 
 
+def stored_spectra(connection: Connection) -> dict[int, tuple[float, ...]]:
+    """Return the stored ordinates [g] of each motion, by id."""
+    columns = (motion_spectrum.c[name] for name in ORDINATES)
+    rows = connection.execute(select(motion_spectrum.c.motion_id, *columns))
+    return {int(number): tuple(ordinates) for number, *ordinates in rows}
+
+
 def horizontal_pairs(connection: Connection, recording_id: int) -> dict[str, list[int]]:
     """Return the horizontal motions of a recording that were processed alike, by processing.
 

@@ -33,6 +33,7 @@ from rbfrag.results.numbers import count_of
 from rbfrag.results.result import Result, ResultList, TextLine, TextTable
 from rbfrag.solver.results import NUMERICS_VERSION
 from rbfrag.vocabulary.quantities import MEASURES, QUANTITIES
+from rbfrag.vocabulary.spectral import spectral_name
 
 _MEASURES = tuple(name for name in MEASURES if QUANTITIES[name].stored)
 _OF_TABLE = {*_MEASURES} & {*CombinationTable.__dataclass_fields__}
@@ -264,10 +265,16 @@ def combination_table(
         motion_id=np.array([row["motion_id"] for row in selected], dtype=np.int64),
         event_guessed=np.array([row["guessed"] for row in selected], dtype=np.bool_),
         pgd_m=pgd_m,
-        measures={name: floats(name) for name in _MEASURES if name not in _OF_TABLE},
+        measures={_measure_of(name): floats(name) for name in _MEASURES if name not in _OF_TABLE},
         **{name: floats(name) for name in numbers},
         **{name: objects(name) for name in object_names},
     )
+
+
+def _measure_of(column: str) -> str:
+    """Return the measure in a column: ``sa(0.3)`` for ``sa03_g``, else of the same name."""
+    period_s = MEASURES[column].period_s
+    return column if period_s is None else spectral_name(period_s)
 
 
 def recordings_of_motions(connection: Connection) -> dict[int, int]:

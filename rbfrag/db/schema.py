@@ -29,8 +29,9 @@ from sqlalchemy import (
 )
 from sqlalchemy.schema import SchemaItem
 
-from rbfrag.motions.response_spectrum import PERIODS_S, SPECTRUM_PERIODS_S
+from rbfrag.motions.response_spectrum import PERIODS_S
 from rbfrag.vocabulary.quantities import MECHANISMS, QUANTITIES
+from rbfrag.vocabulary.spectral import SPECTRUM_PERIODS_S
 
 metadata = MetaData(
     naming_convention={
@@ -566,7 +567,7 @@ fragility_model = _table(
     _row_number(),
     _column("name", Text, "name of the model"),
     _column("kind", Text, _KIND),
-    _column("term", Text, "intensity term, such as pgv, pgv_pga, sa10, xp"),
+    _column("term", Text, "intensity term, such as pgv, pgv_pga, sa, xp"),
     _column("method", Text, "method of the fit"),
     _column("coefficients", Text, "JSON object: value by parameter, in order"),
     _column("covariance", Text, "JSON list of lists: covariance of the parameters in that order"),
@@ -587,6 +588,13 @@ fragility_model = _table(
         "dependence",
         Text,
         "JSON object: correlation of the blocks of one earthquake, by parameter, and its errors",
+    ),
+    _optional(
+        "completions",
+        Text,
+        "JSON Lines: regressions of the spectral velocity on the measures named in inputs, with "
+        "coefficients and sigma at p² = 30, 10, 3, 1, 0.3 and 0.1 1/s², the fractions of the "
+        "variance that earthquake and recording share, and the changes without each earthquake",
     ),
     UniqueConstraint("name"),
     CheckConstraint("name <> ''", name="name"),

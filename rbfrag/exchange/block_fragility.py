@@ -26,6 +26,7 @@ from rbfrag.results.numbers import exact_percent
 from rbfrag.solver.kinds import mode_of_kind
 from rbfrag.solver.results import FloatArray
 from rbfrag.vocabulary.quantities import MEASURES
+from rbfrag.vocabulary.spectral import SpectralMapping
 
 FAILED = {"topple": "toppled", "slide": "slid", "slump": "slumped", "confined_topple": "toppled"}
 """The limit state of a block by its mode."""
@@ -33,7 +34,10 @@ FAILED = {"topple": "toppled", "slide": "slid", "slump": "slumped", "confined_to
 LEAST, FLOOR = 5e-6, 1e-5
 """P where a function begins, and the least P to which errors are relative."""
 
-TOP = {name: measure.top for name, measure in MEASURES.items() if measure.top is not None}
+TOP = SpectralMapping(
+    {name: measure.top for name, measure in MEASURES.items() if measure.top is not None},
+    lambda name: MEASURES[name].top, "sa_g",
+)  # fmt: skip
 """The strongest shaking [m/s or g] that a function covers, by the measure's name in `predict`."""
 
 _WEAKEST, _SCANNED, _FINE, _HALVINGS = 1e-5, 1001, 1201, 40
@@ -131,7 +135,7 @@ def block_functions(
     Args:
         numbers: what a model reads of them, by field, shape (m,) each; NaN of an option for the
             block's own.
-        measure: ``pgv_m_s``, ``pga_g`` or ``sa10_g``, which a model reads alone.
+        measure: ``pgv_m_s``, ``pga_g`` or ``sa(1)``, which a model reads alone.
         kind: how they fail; None for what they are given by.
         one_class: the blocks stand for one class: one function, their mean, of one name.
         levels: greatest number of levels of a function.
@@ -299,7 +303,7 @@ def _lognormal(curve: BlockCurve, top: float) -> tuple[float, float] | None:
     covered = (curve.p >= LEAST) & (curve.u <= math.log(top))
     u, p = curve.u[covered], curve.p[covered]
     middle = p < 1.0 - 1e-5
-    if middle.sum() < 3:
+    if middle.sum() < 3 or p[0] > FLOOR:  # one that begins with a jump is none
         return None
     slope, intercept = np.polyfit(u[middle], ndtri(p[middle]), 1)
     if slope <= 0.0 or np.abs(ndtr(intercept + slope * u) - p).max() >= _STRAIGHT:
@@ -361,7 +365,7 @@ def share_functions(
     meaning = component_named(component)
     kind, curves = curves_of(numbers, measure, chosen, [name], meaning.sigma)
     curve_of_each = [(ndtri(curve.p), curve.u) for curve in curves]
-    blocks = Placement.of_numbers(chosen.method.block, numbers)
+    blocks = Placement.of_blocks(chosen, numbers)
     assert blocks is not None
     sampler, generator = JointSampler(chosen.dependence, blocks), np.random.default_rng(0)
     counts = [max(1, math.ceil(share / 100.0 * p2.size - 1e-9)) for share in shares]

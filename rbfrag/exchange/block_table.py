@@ -46,6 +46,7 @@ from rbfrag.vocabulary.quantities import (
     SHAKING,
     column_of,
 )
+from rbfrag.vocabulary.spectral import BY_PERIOD
 
 TEXTS = ("block_id", "site_id", "kind", "mode", "crs", *PLANE_TEXTS)
 """Columns of texts."""
@@ -431,7 +432,8 @@ def write_template(path: str | os.PathLike[str]) -> Path:
     sheet.append([*names])
     sheet.append(row)
     column_sheet.append(["column", "description", "other names"])
-    for name in quantities.COLUMNS:
+    spectral = ("sa(1)", "sa(1)_sigma")  # or at any other period
+    for name in (*(name for name in quantities.COLUMNS if name not in BY_PERIOD), *spectral):
         help = quantities.QUANTITIES[name].help(quantities.word_of)
         column_sheet.append([header_of(name), help, ", ".join(quantities.INPUTS[name].aliases)])
     with written_whole(target, "table") as partial:

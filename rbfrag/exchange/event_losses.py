@@ -30,8 +30,8 @@ from rbfrag.hazards.portfolio import Portfolio
 from rbfrag.hazards.shaking import (
     LAW_TAU,
     PGA_ALONE,
-    PREFERRED,
     TAU,
+    by_preference,
     component_of_velocity,
     velocity_of,
 )
@@ -94,9 +94,9 @@ def losses(
         expected: do without samples; then there are no curves of exceedance.
         seed: of the samples; the answer does not depend on the number of workers.
         imt: intensity measures that the models read, as OpenQuake names them; None for the first
-            of PGV and SA(1.0) that the job has. Of PGA alone PGV is taken by the magnitudes of the
-            ruptures, unless `model` is named. Several measures, of which `model` names the model,
-            are drawn independently by the engine, which a warning tells of.
+            of PGV, SA(1.0) and other SA that the job has. Of PGA alone PGV is taken by the
+            magnitudes of the ruptures, unless `model` is named. Several measures, of which `model`
+            names the model, are drawn independently by the engine, which a warning tells of.
         component: horizontal component of the measures: single, geometric_mean, rotd50, rotd100 or
             larger; None for rotd50, with a note. Its dispersion is common to the blocks of one
             site and event.
@@ -122,7 +122,7 @@ def losses(
     meaning = component_named("rotd50" if component is None else component)
     if not imt:  # the best predictor among the measures of the job
         present = {requested_measure(name)[0]: name for name in measures_in(job)}
-        imt = (next((present[n] for n in (*PREFERRED, "pga_g") if n in present), "PGV"),)
+        imt = (next((present[name] for name in by_preference(present)), "PGV"),)
     events = read_events(job, imts=imt, **lasted)
     events, meaning, tau, remark = _by_one_measure(events, job, meaning, answering)
     # the sites of the blocks, without blocks that have no site
@@ -177,7 +177,7 @@ def _by_one_measure(
     if more and answering.get("model") is None:
         raise InputError(
             "several intensity measures require models by name: a single measure is better, PGV "
-            "before SA(1.0)",
+            "before SA",
             fields=("imt", "model"),
         )
     if more or name != "pga_g":
@@ -187,8 +187,7 @@ def _by_one_measure(
     magnitudes = read_magnitudes(job)
     if magnitudes is None:
         raise InputError(
-            f"{PGA_ALONE}; give PGV or SA(1.0), the ruptures file with magnitudes, or a model of "
-            "PGA",
+            f"{PGA_ALONE}; give PGV or SA, the ruptures file with magnitudes, or a model of PGA",
             fields=("imt", "model"),
         )
     velocity = velocity_of(events.measures[name], magnitudes[events.event])

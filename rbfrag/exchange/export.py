@@ -113,7 +113,7 @@ def nrml(
     - the fields of blocks, each a number or of shape (m,), with ``kind``, as
       :func:`rbfrag.predict` has them; all blocks are of one kind.
     - ``blocks``: instead of these a table of blocks: a file, or columns by name.
-    - ``imt``: measure of the functions: PGV (the default), PGA, or SA at 1 s.
+    - ``imt``: measure of the functions: PGV (the default), PGA, or SA(T) such as ``SA(0.5)``.
     - ``one_class``: one function, the mean over the blocks.
     - ``name``: identifier of a single block, or of the class; ``block`` if not given.
     - ``levels``: greatest number of levels of a function that is not lognormal; 80 if not given.
@@ -223,7 +223,7 @@ class _Request(NamedTuple):
         blocks, one_class = request.get("blocks"), request.get("one_class", False)
         rows = collect_blocks(inputs, blocks)
         table = rows.require_all(EACH_NEEDED)
-        measure, _ = requested_measure(request.get("imt", "PGV"), alone=True)
+        measure, _ = requested_measure(request.get("imt", "PGV"))
         kind, read, medians = read_by_models(rows)
         names = [str(block_id) for block_id in table["block_id"]]
         if one_class or (blocks is None and len(names) == 1):

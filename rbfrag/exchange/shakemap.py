@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
+import re
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -28,12 +29,12 @@ _V = {"cms": 0.01, "cm/s": 0.01, "m/s": 1.0}
 _MEASURES: Mapping[str, tuple[str, Mapping[str, float]]] = {
     "PGV": ("pgv_m_s", _V),
     "PGA": ("pga_g", _G),
-    "PSA03": ("sa03_g", _G),
-    "PSA10": ("sa10_g", _G),
-    "PSA30": ("sa30_g", _G),
 }
 """Measures that are read of a grid: our name, and its units with their factors; a blank unit is the
 first of them."""
+
+_SPECTRAL = re.compile(r"PSA(\d)(\d)|SA\(([\d.]+)\)")
+"""Spectral accelerations of a grid, by the period in tenths of a second or in seconds."""
 
 _MOST_STD = 5.0
 
@@ -77,20 +78,33 @@ class ShakeMapGrid:
         return has_all_fields(self.measures, self.std_ln)
 
 
+def _measure_of(title: str, prefix: str = "") -> tuple[str, Mapping[str, float]] | None:
+    """Return name and units of the measure of a field; None where it is not read."""
+    if not title.startswith(prefix):
+        return None
+    title = title.removeprefix(prefix)
+    if (match := _SPECTRAL.fullmatch(title)) is None:
+        return _MEASURES.get(title)
+    period = match[3] or f"{match[1]}.{match[2]}"
+    name = f"sa({float(period):g})" if is_numeral(period) else ""
+    return (name, _G) if name in MEASURES else None
+
+
 Place = tuple[int, str, int]
 """Column of a field, its unit, and the line that states them."""
 
 
 def _read_grid(
-    path: str | os.PathLike[str], needed: Sequence[str], *, allow_partial: bool
+    path: str | os.PathLike[str], prefix: str = "", *, allow_partial: bool
 ) -> ShakeMapGrid:
     """Return a grid or its uncertainty.
 
     Args:
-        needed: fields of which one is required in addition to LON and LAT.
+        prefix: beginning of the names of the fields of which one is required in addition to LON
+            and LAT.
     """
     source = str(path)
-    tags, positions, table = _parse_grid(source, needed)
+    tags, positions, table = _parse_grid(source, prefix)
     specification = tags.get("grid_specification", {})
     size = {}
     for name in ("nlon", "nlat"):
@@ -122,13 +136,15 @@ def _read_grid(
     measures: dict[str, FloatArray] = {}
     std_ln: dict[str, FloatArray] = {}
     for prefix, group in (("", measures), ("STD", std_ln)):
-        for title, (name, units) in _MEASURES.items():
-            if (place := positions.get(prefix + title)) is not None:
+        titles = dict.fromkeys((*(prefix + title for title in _MEASURES), *positions))
+        for title in titles:
+            if title in positions and (measure := _measure_of(title, prefix)) is not None:
+                name, units = measure
                 largest = None if prefix else MEASURES[name].largest
                 # the standard deviation of a logarithm does not depend on the unit inside
                 of_logs = {f"ln({unit})": 1.0 for unit in units}
                 group[name] = _field(
-                    source, table, prefix + title, place, of_logs if prefix else units,
+                    source, table, title, positions[title], of_logs if prefix else units,
                     largest or _MOST_STD, warnings,
                 )  # fmt: skip
     fields = (*coordinates, *measures.values(), *std_ln.values())
@@ -163,7 +179,7 @@ def _read_grid(
 
 
 def _parse_grid(
-    source: str, needed: Sequence[str]
+    source: str, prefix: str
 ) -> tuple[dict[str, Mapping[str, str]], dict[str, Place], FloatArray]:
     """Return the attributes by tag, the positions of the fields, and grid_data by node."""
     tags: dict[str, Mapping[str, str]] = {}
@@ -183,12 +199,13 @@ def _parse_grid(
             positions[title] = int(index) - 1, attributes.get("units", "").strip(), line
         elif kind == "start" and text == "grid_data":
             in_data, data_line = True, line
-            for titles in (("LON",), ("LAT",), needed):
-                if not set(titles) & set(positions):
+            measures = [title for title in positions if _measure_of(title, prefix)]
+            needed = " or ".join(prefix + title for title in (*_MEASURES, "PSA10"))
+            for title in ("LON", "LAT", needed):
+                if not measures if title == needed else title not in positions:
                     have = ", ".join(positions) or "none"
                     raise InputError(
-                        f"{source}, line {line}: there is no field {' or '.join(titles)}; the "
-                        f"fields are {have}"
+                        f"{source}, line {line}: there is no field {title}; the fields are {have}"
                     )
         elif in_data and (kind == "text" or (kind, text) == ("end", "grid_data")):
             in_data = kind == "text"
@@ -279,11 +296,10 @@ def read_shakemap(
             f"{path} is HDF5 (shake_result.hdf), which is not supported: use grid.xml and "
             "uncertainty.xml of the same ShakeMap"
         )
-    grid = _read_grid(path, tuple(_MEASURES), allow_partial=allow_partial)
+    grid = _read_grid(path, allow_partial=allow_partial)
     if uncertainty is None:
         return grid
-    needed = tuple(f"STD{title}" for title in _MEASURES)
-    other = _read_grid(uncertainty, needed, allow_partial=allow_partial)
+    other = _read_grid(uncertainty, "STD", allow_partial=allow_partial)
     ids = [shaken.event["event_id"] for shaken in (other, grid)]
     if all(ids) and ids[0] != ids[1]:
         raise InputError(

@@ -20,8 +20,10 @@ from rbfrag.exchange.tables.csv_file import as_text, as_written, changed_texts, 
 from rbfrag.exchange.tables.files import table_path, table_writer, write_csv_notes
 from rbfrag.exchange.tables.parts import TablePart, Write
 from rbfrag.files import as_path, written_whole
+from rbfrag.fragility.dependence import EXACT
 from rbfrag.fragility.joint import UNKNOWN, Placement, count_moments, count_quantiles
 from rbfrag.fragility.measures import MEASURES
+from rbfrag.fragility.method import SINGLE
 from rbfrag.fragility.model_selection import find_model
 from rbfrag.fragility.prediction_array import PredictionArray
 from rbfrag.fragility.validation import FIRST, describe_invalid, reject
@@ -299,7 +301,7 @@ def predict_table(
         answered=answered,
         without_answer=total - answered,
         in_domain=inside,
-        **_total_failures(together, [*chosen["model"]], question),
+        **_total_failures(together, [*chosen["model"]], question, fields),
         **model_names,
         blocks=rows if goal is None else None,
         warnings=diagnostics(notes),
@@ -310,6 +312,7 @@ def _total_failures(
     together: Sequence[tuple[FloatArray, FloatArray, NDArray[np.object_], FloatArray]],
     models: Sequence[str],
     question: Mapping[str, Any],
+    fields: Collection[str],
 ) -> dict[str, Any]:
     """Return the expected number of failures, and its range if one earthquake shakes all rows.
 
@@ -320,19 +323,26 @@ def _total_failures(
         together: P, velocity y [m/s], site and number of blocks of rows.
         models: names of the models that answer; the range of several is not known.
         question: as :func:`predict_table` has it.
+        fields: names of what is given.
     """
     p, y, names, count = (np.concatenate(column) for column in zip(*together, strict=True))
     ends: dict[str, float | None] = dict.fromkeys(("failures_low", "failures_high"))
-    law = None
+    law, loadings = None, EXACT
     if len(models) == 1:
-        model, rotation = question.get("model") or models[0], question.get("rotation_deg")
-        law = find_model(model, MEASURES, question.get("db"), rotation_deg=rotation).dependence
+        name, rotation = question.get("model") or models[0], question.get("rotation_deg")
+        measures = _measures_of(fields)
+        model = find_model(name, measures, question.get("db"), rotation_deg=rotation)
+        law, block = model.dependence, model.method.block
+        if block.size is not None:
+            typical = {block.size: _TYPICAL_P2, block.strength: _TYPICAL_STRENGTH}
+            loadings = model.loadings(typical, SINGLE)
     expected = float(count @ p)
     if law is not None:
         ln_y = np.log(np.where(np.isfinite(y) & (y > 0.0), y, 1.0))
         blocks = Placement.of(
-            0.0, ln_y, site=np.unique(names.astype(str), return_inverse=True)[1], polarity=UNKNOWN
-        )
+            0.0, ln_y, site=np.unique(names.astype(str), return_inverse=True)[1], polarity=UNKNOWN,
+            loadings=loadings,
+        )  # fmt: skip
         total = int(count.sum())
         alone = float(count @ (p * (1.0 - p)))
         # some blocks drawn without replacement, of which a row with a count holds several
@@ -346,6 +356,19 @@ def _total_failures(
         counts = count_quantiles(total, expected, alone + shared, levels)
         ends = dict(zip(ends, map(float, counts), strict=True))
     return {"expected_failures": expected, **ends}
+
+
+_TYPICAL_P2, _TYPICAL_STRENGTH = 3.0, 0.1
+"""The block whose spectral velocity stands for those of all rows in what they share."""
+
+
+def _measures_of(fields: Collection[str]) -> list[str]:
+    """Return the intensity measures among the fields; those of a scenario where it is one."""
+    if "gmm_sigma" in fields:
+        from rbfrag.question.bssa14 import MEASURES as OF_SCENARIO
+
+        return list(OF_SCENARIO)
+    return [name for name in fields if name in MEASURES]
 
 
 def _answer(

@@ -15,7 +15,7 @@ import numpy as np
 from rbfrag.db.shock_pairs import ShockEnd, StoredShockPair
 from rbfrag.fragility.confidence import ParameterErrors, packed, quantiles_of
 from rbfrag.fragility.fit.result import cr3
-from rbfrag.fragility.method import SINGLE
+from rbfrag.fragility.method import SINGLE, LinearPredictor
 from rbfrag.solver.results import Outcome
 
 STATES = (0.0, 0.5, 1.0)
@@ -191,7 +191,7 @@ def share_of_events(fails: np.ndarray, event: np.ndarray, level: float = LEVEL) 
     excess = np.bincount(event, fails - share)
     steps = (excess / ((n - size) * share * (1.0 - share)))[:, None]
     errors = ParameterErrors(packed(cr3(steps).tolist()), tuple(map(tuple, steps.tolist())))
-    half = errors.half_width((1.0,), quantiles_of(level), SINGLE)
+    half = errors.half_width(LinearPredictor(None, (1.0,)), quantiles_of(level), SINGLE)
     eta = math.log(share / (1.0 - share))
     low, high = (1.0 / (1.0 + math.exp(-(eta + side * half))) for side in (-1.0, 1.0))
     return FailureShare(count, share, low, high)

@@ -6,15 +6,17 @@ of the fits that each leave an earthquake out. Nothing else widens it. No librar
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import cache, cached_property, lru_cache
+from itertools import chain
 from operator import mul
 from typing import Any, NamedTuple
 
 from rbfrag.errors import InputError
 from rbfrag.fragility.dependence import normal_quantile
-from rbfrag.fragility.method import ArrayNamespace
+from rbfrag.fragility.method import ArrayNamespace, LinearPredictor
 
 FEWEST_FREEDOMS = 2.0
 """No quantile is taken with fewer degrees of freedom."""
@@ -49,12 +51,21 @@ class ParameterErrors:
         packed_covariance: V on and below its diagonal, row by row, those off it doubled.
         steps: d, the change of the parameters without each earthquake, (G, k); empty where V is
             taken for known, which gives the normal quantile.
+        node_steps: the same of the coefficients and the scatter of a regression, for each of its
+            sizes (G, m); empty for none.
     """
 
     packed_covariance: tuple[float, ...]
     steps: tuple[tuple[float, ...], ...]
+    node_steps: tuple[tuple[tuple[float, ...], ...], ...] = ()
 
-    def half_width(self, x: Sequence[Any], quantiles: Quantiles, ns: ArrayNamespace) -> Any:
+    @property
+    def size(self) -> int:
+        """Number of parameters, with those of the regression at each of its sizes."""
+        of_one = (math.isqrt(8 * len(self.packed_covariance) + 1) - 1) // 2
+        return of_one + sum(len(steps[0]) for steps in self.node_steps)
+
+    def half_width(self, x: LinearPredictor, quantiles: Quantiles, ns: ArrayNamespace) -> Any:
         """Return t(ν) se, the half width of the confidence interval of eta.
 
         With c_e = (x·d_e)², se² = (G-1)/G Σ c scatters like a chi-square number of
@@ -69,10 +80,10 @@ class ParameterErrors:
         g = len(self.steps)
         if not g:
             variance, k = 0.0, 0
-            for i, slope in enumerate(x):
+            for i, slope in enumerate(x.slopes):
                 inner = self.packed_covariance[k + i] * slope
                 for j in range(i):
-                    inner = inner + self.packed_covariance[k + j] * x[j]
+                    inner = inner + self.packed_covariance[k + j] * x.slopes[j]
                 variance = variance + inner * slope
                 k += i + 1
             return quantiles.normal * ns.sqrt(ns.maximum(variance, 0.0))
@@ -81,6 +92,87 @@ class ParameterErrors:
         per_freedom = 0.5 * squares / ns.maximum(total * total, 1e-300) - 0.5 / g
         per_freedom = ns.minimum(ns.maximum(per_freedom, 1.0 / (g - 1.0)), 1.0 / FEWEST_FREEDOMS)
         return quantiles.student_at(per_freedom) * ns.sqrt(total * ((g - 1.0) / g))
+
+    def sums_of_number(self, x: LinearPredictor) -> tuple[float, float]:
+        """Return Σ (x·d)² and Σ (x·d)⁴ of single slopes x."""
+        if not self.node_steps and len(x.slopes) == len(self.steps[0]):
+            return self.step_sums(*x.slopes)
+        slopes = (*x.slopes, *x.node_slopes) if x.node_weights else x.slopes
+        rows = self.steps_at(x.node_weights) if x.node_weights else self.all_steps
+        squares = _squares_of(len(slopes))(rows, *slopes)
+        return sum(squares), sum(map(mul, squares, squares))
+
+    def steps_at(self, weights: tuple[float, ...]) -> list[tuple[float, ...]]:
+        """Return the steps of parameters and regression at one size, from the weights of nodes."""
+        if self.last.get("weights") != weights:
+            nodes = [(w, steps) for w, steps in zip(weights, self.node_steps, strict=True) if w]
+            regression = [
+                tuple(sum(w * steps[e][i] for w, steps in nodes) for i in range(len(row)))
+                for e, row in enumerate(self.node_steps[0])
+            ]
+            rows = [(*d, *w) for d, w in zip(self.steps, regression, strict=True)]
+            self.last.update(weights=weights, rows=rows)
+        return list(self.last["rows"])
+
+    @cached_property
+    def last(self) -> dict[str, Any]:
+        """The last answer of :meth:`steps_at`: many questions are about one block."""
+        return {}
+
+    @cached_property
+    def all_steps(self) -> list[tuple[float, ...]]:
+        """Return the steps of the parameters and of the regression at each node, a line each."""
+        return [
+            tuple(chain(d, *(steps[e] for steps in self.node_steps)))
+            for e, d in enumerate(self.steps)
+        ]
+
+    def sums_of_arrays(self, x: LinearPredictor) -> tuple[Any, Any]:
+        """Return Σ (x·d)² and Σ (x·d)⁴ of slopes x that are arrays."""
+        import numpy as np
+
+        k, columns = len(x.slopes), np.broadcast_arrays(*x.slopes, *x.node_slopes, *x.node_weights)
+        steps = self.matrix
+        if not x.node_weights:
+            return _sums(steps[:, :k], np.stack(columns))
+        # only two nodes have a weight: blocks between the same two are worked on together
+        slopes, weights = (
+            np.stack(columns[: -len(x.node_weights)]),
+            np.stack(columns[-len(x.node_weights) :]),
+        )
+        m, size = len(x.node_slopes), slopes.shape[1]
+        first = np.minimum(np.argmax(weights > 0.0, axis=0), len(weights) - 2)
+        totals = np.empty((2, size))
+        for node in np.unique(first):
+            chosen = np.flatnonzero(first == node) if (first != node).any() else slice(None)
+            part, at = slopes[:, chosen], weights[node : node + 2, None, chosen]
+            both = (at * part[k:]).reshape(2 * m, -1)
+            start = k + node * m
+            these = np.hstack([steps[:, :k], steps[:, start : start + 2 * m]])
+            totals[:, chosen] = _sums(these, np.concatenate([part[:k], both]))
+        return totals[0], totals[1]
+
+    def covariance_times(self, gradient: Any) -> Any:
+        """Return V g, V of the parameters and the regression at each node, shape (k,).
+
+        Args:
+            gradient: g, shape (k,).
+        """
+        import numpy as np
+
+        if self.steps:
+            g = len(self.steps)
+            return (g - 1.0) / g * (self.matrix.T @ (self.matrix @ gradient))
+        lower = np.zeros((gradient.size, gradient.size))
+        lower[np.tril_indices(gradient.size)] = self.packed_covariance
+        return 0.5 * (lower + lower.T) @ gradient + 0.5 * np.diag(lower) * gradient
+
+    @cached_property
+    def matrix(self) -> Any:
+        """Return :attr:`all_steps` as an array."""
+        import numpy as np
+
+        return np.array(self.all_steps)
 
     @cached_property
     def step_sums(self) -> Callable[..., tuple[float, float]]:
@@ -107,6 +199,36 @@ class ParameterErrors:
         sums = ",".join(written([1.0] * len(self.steps), 0, order, 0) for order in (2, 4))
         function: Callable[..., tuple[float, float]] = eval(f"lambda {names}: ({sums})")
         return function
+
+
+@cache
+def _squares_of(size: int) -> Callable[..., list[float]]:
+    """Return (x·d)² of rows d as a function of the rows and the slopes x, written out: in half the
+    time of sums of products.
+    """
+    slopes, row = (",".join(f"{name}{i}" for i in range(size)) for name in ("x", "d"))
+    product = "+".join(f"x{i}*d{i}" for i in range(size))
+    function: Callable[..., list[float]] = eval(
+        f"lambda rows,{slopes}: [({product})**2 for {row}, in rows]"
+    )
+    return function
+
+
+def _sums(steps: Any, columns: Any) -> tuple[Any, Any]:
+    """Return Σ (x·d)² and Σ (x·d)⁴ over the rows d of `steps`, of the columns x."""
+    import numpy as np
+
+    # more terms than earthquakes: here the products are faster than the polynomials
+    total, fourths = np.empty((2, columns.shape[1]))
+    # so few at a time stay near the processor, and BLAS starts no threads of its own
+    for start in range(0, columns.shape[1], 512):
+        part = slice(start, start + 512)
+        squares = steps @ columns[:, part]
+        squares *= squares
+        np.add.reduce(squares, axis=0, out=total[part])
+        squares *= squares
+        np.add.reduce(squares, axis=0, out=fourths[part])
+    return total, fourths
 
 
 def packed(covariance: Sequence[Sequence[float]]) -> tuple[float, ...]:

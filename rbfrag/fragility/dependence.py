@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from rbfrag.errors import InputError
 
@@ -20,6 +20,39 @@ if TYPE_CHECKING:
 
 ROOT_HALF = math.sqrt(0.5)
 ROOT_TWO_PI = math.sqrt(2.0 * math.pi)
+
+
+class Loadings(NamedTuple):
+    """Scatter of a completed spectral velocity in Z, before Z is scaled to variance 1: √w of
+    :class:`Dependence`, split by what shares it.
+
+    Args:
+        event: √(w f_e), shared by all blocks of an earthquake.
+        site: √(w (f_s - f_e)), shared by those of one site in addition.
+        component: √(w (1 - f_s)), shared by those of one component in addition.
+    """
+
+    event: Any
+    site: Any
+    component: Any
+
+    @property
+    def variance(self) -> Any:
+        """Variance of Z before it is scaled, 1 + w."""
+        return 1.0 + self.event**2 + self.site**2 + self.component**2
+
+
+EXACT = Loadings(0.0, 0.0, 0.0)
+"""Loadings where the spectral velocity is exact, or the model reads none."""
+
+
+class Shares(NamedTuple):
+    """Shares ρ of :class:`Dependence` of like blocks, numbers or arrays."""
+
+    rho_e: Any
+    rho_s: Any
+    rho_v: Any
+    rho_o: Any
 
 
 @dataclass(frozen=True)
@@ -32,6 +65,10 @@ class Dependence:
 
     with D = |l_i - l_j|, l = ln(p s), d = |ln y_i - ln y_j|, q = +1 for the same polarity and -1
     for opposite ones. D and d, and so all lengths, are differences of logarithms without unit.
+
+    Where a spectral velocity is completed by a regression, whose scatter has the share w = (h b σ)²
+    of η, R becomes [R + √(w_i w_j) f]/√((1 + w_i)(1 + w_j)): f is f_e for blocks of one earthquake,
+    f_s of one site and 1 of one component.
 
     Args:
         rho_e: share of the variance of Z that all blocks of an earthquake have in common, 0 to 1.
@@ -93,6 +130,16 @@ class Dependence:
         antisymmetric = sign * self.rho_o * np.exp(-distance_l / self.l_o)
         component = same_component * (symmetric + antisymmetric) * np.exp(-distance_y / self.l_y)
         return np.asarray(shared * np.exp(-distance_l / self.l_e) + component)
+
+    def shares(self, loadings: Loadings = EXACT) -> Shares:
+        """Return the shares of like blocks whose spectral velocity is completed alike."""
+        variance = loadings.variance
+        return Shares(
+            (self.rho_e + loadings.event**2) / variance,
+            (self.rho_s + loadings.site**2) / variance,
+            (self.rho_v + loadings.component**2) / variance,
+            self.rho_o / variance,
+        )
 
 
 def normal_share(z: float) -> float:

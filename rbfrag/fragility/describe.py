@@ -19,6 +19,7 @@ from rbfrag.vocabulary.quantities import (
     measured_by,
     word_of,
 )
+from rbfrag.vocabulary.spectral import spectral_names
 
 if TYPE_CHECKING:
     from rbfrag.db.model_file import ModelRow
@@ -42,20 +43,28 @@ def shaking(uncertain: Mapping[str, Any], inputs: Mapping[str, Any]) -> str:
         uncertain: median and dispersion ``sigma`` of each uncertain measure, by name.
         inputs: measures and the scenario, by the names of :func:`rbfrag.predict`.
     """
+    spectrum = spectral_names(name for name in inputs if name not in uncertain)
+    named = (*INTENSITY, *_few(spectrum), "rjb_km", "vs30_m_s")
     parts = [
         f"{_measure(name)} {inputs[name]:.4g} {QUANTITIES[name].unit}".rstrip()
-        for name in (*INTENSITY, "rjb_km", "vs30_m_s")
+        for name in named
         if isinstance(inputs.get(name), int | float) and name not in uncertain
     ]
+    if len(spectrum) > _MOST_ORDINATES:
+        parts.append(f"SA at {len(spectrum)} periods")
     if not uncertain:
         return ", ".join(parts)
     gmm = inputs.get("gmm")
     of_median, of_sigma = ("", "") if gmm is None else (" (RotD50)", " of a single component")
+    of_spectrum = spectral_names(uncertain)
+    listed = [name for name in uncertain if name not in of_spectrum] + _few(of_spectrum)
     medians = ", ".join(
-        f"median {_measure(name)} {about['median']:.2g} {QUANTITIES[name].unit}{of_median}, σ_ln "
-        f"{about['sigma']:.2g}{of_sigma}"
-        for name, about in uncertain.items()
+        f"median {_measure(name)} {uncertain[name]['median']:.2g} {QUANTITIES[name].unit}"
+        f"{of_median}, σ_ln {uncertain[name]['sigma']:.2g}{of_sigma}"
+        for name in listed
     )
+    if len(of_spectrum) > _MOST_ORDINATES:
+        medians = f"{medians}, SA at {len(of_spectrum)} periods"
     distribution = "this distribution" if len(uncertain) == 1 else "these distributions"
     mean = f"P is the mean over {distribution}"
     if gmm is None:
@@ -65,6 +74,15 @@ def shaking(uncertain: Mapping[str, Any], inputs: Mapping[str, Any]) -> str:
     if "amplification" in inputs:
         parts.append(f"amplification {inputs['amplification']:g}")
     return f"{', '.join(parts)} ({gmm}): {medians}; {mean}"
+
+
+_MOST_ORDINATES = 3
+"""Of more spectral ordinates their number is given."""
+
+
+def _few(spectrum: list[str]) -> list[str]:
+    """Return the ordinates if they are few, else none."""
+    return spectrum if len(spectrum) <= _MOST_ORDINATES else []
 
 
 def drained_bound(bound: Mapping[str, float | None]) -> str:
@@ -197,22 +215,22 @@ def labelled_values(numbers: Mapping[str, float], digits: int) -> str:
 
 def model(document: Mapping[str, Any]) -> str:
     """Describe the model of a prediction: its predictors, and what distinguishes it."""
+    from rbfrag.db.model_file import COMPARED
     from rbfrag.fragility.measures import TERMS
     from rbfrag.fragility.method import TOPPLING_BLOCK
     from rbfrag.fragility.methods import method_named
 
     if (term := TERMS.get(document["term"])) is None:  # several models
         return str(document["model"])
-    read = map(_measure, term.inputs)
+    read = map(_measure, term.inputs) if term.inputs else ["SA(T)"]
     method = method_named(document["method"])
     kind = "" if method.block is TOPPLING_BLOCK else method.block.kind.replace("_", " ")
-    method_name = "" if method.forms[term.name].rank == 0 else method.name
-    sized = "size-dependent" if "block's" in term.title else ""
-    return ", ".join(filter(None, (*read, sized, kind, method_name)))
+    method_name = method.name if method.name in COMPARED else ""
+    return ", ".join(filter(None, (*read, kind, method_name)))
 
 
 def named_model(document: Mapping[str, Any]) -> str:
-    """Return the name of a model and its description: "bounded-pgv_kr (PGV, …)"."""
+    """Return the name of a model and its description: "toppling-pgv (PGV)"."""
     title = model(document)
     return title if title == document["model"] else f"{document['model']} ({title})"
 

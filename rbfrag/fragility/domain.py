@@ -11,7 +11,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
-from functools import partial
 from typing import Any, NamedTuple
 
 from rbfrag.errors import ModelError
@@ -19,7 +18,7 @@ from rbfrag.fragility.confidence import packed
 from rbfrag.fragility.method import ArrayNamespace
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.results.numbers import exact_percent
-from rbfrag.vocabulary.quantities import MEASURES, QUANTITIES, SPECTRAL
+from rbfrag.vocabulary.quantities import MEASURES, QUANTITIES
 
 INSIDE = 0.995
 """Share of the fitted points that lie within the fitted distance."""
@@ -29,9 +28,11 @@ MARGIN = 2.0
 
 
 def _name_of(value: str) -> str:
-    """Return the name of a quantity in a ratio: an intensity measure, or p of the block."""
+    """Return the name of a quantity in a ratio: a measure, a spectral velocity, p of the block."""
     if value not in MEASURES:
-        return "block's p"
+        return (
+            "spectral velocity at the block's periods" if value == "velocity_m_s" else "block's p"
+        )
     return MEASURES[value].imt or MEASURES[value].title or QUANTITIES[value].symbol
 
 
@@ -81,9 +82,10 @@ class Ratio:
         is_ratio = "is"
         if ratio is not None:
             is_ratio = f"is {ratio:.2g}{self.unit},"
+            units = {"p": "1/s", "velocity_m_s": "m/s"}
             names = {
-                value: f"a{'n' if name.startswith('SA') else ''} {name} of {values[value]:.3g} "
-                f"{QUANTITIES[value].unit if value in MEASURES else '1/s'}"
+                value: f"a {name} of {values[value]:.3g} "
+                f"{units.get(value) or QUANTITIES[value].unit}"
                 for value, name in names.items()
             }
         if fitted is None and self.shipped is not None:
@@ -102,26 +104,6 @@ class Ratio:
         return (
             f"{first} is inconsistent with {' and '.join(rest)}: {self.symbol} {is_ratio} {where}"
         )
-
-
-def _over(name: str, factor: float, other: str, values: Mapping[str, Any]) -> Any:
-    return values[name] * factor / values[other]
-
-
-def _sa_ratios(name: str, period_s: float) -> tuple[Ratio, Ratio]:
-    """Return SA(T) as a velocity over PGV, and over PGA."""
-    label = f"SA({period_s:.1f})"
-    to_velocity = STANDARD_GRAVITY_M_S2 * period_s / (2.0 * math.pi)
-    return (
-        Ratio(
-            f"v{name[2:4]}_over_pgv", f"{label}·g·T/2π over PGV", "", (name, "pgv_m_s"),
-            partial(_over, name, to_velocity, "pgv_m_s"),
-        ),
-        Ratio(
-            f"{name[:4]}_over_pga", f"{label}/PGA", "", (name, "pga_g"),
-            partial(_over, name, 1.0, "pga_g"),
-        ),
-    )  # fmt: skip
 
 
 RATIOS: tuple[Ratio, ...] = (
@@ -146,7 +128,14 @@ RATIOS: tuple[Ratio, ...] = (
         lambda v: v["pgd_m"] * 2.0 * math.pi / (v["pgv_m_s"] * v["tm_s"]),
         (1.18, 110.0),
     ),
-    *(ratio for period_s, name in SPECTRAL.items() for ratio in _sa_ratios(name, period_s)),
+    Ratio(
+        "velocity_over_pgv", "V(p)/PGV", "", ("velocity_m_s", "pgv_m_s"),
+        lambda v: v["velocity_m_s"] / v["pgv_m_s"],
+    ),
+    Ratio(
+        "velocity_over_pga_s", "V(p)/(PGA·g)", " s", ("velocity_m_s", "pga_g"),
+        lambda v: v["velocity_m_s"] / (v["pga_g"] * STANDARD_GRAVITY_M_S2),
+    ),
 )  # fmt: skip
 """The ratios that are fitted and judged; PGD·PGA/PGV² after Newmark and Rosenblueth (1971).
 
@@ -199,7 +188,8 @@ class Spread(NamedTuple):
     @property
     def sentence(self) -> str:
         """Warning for points outside the ellipsoid."""
-        *leading, last = self.names
+        words = {"velocity_m_s": "the spectral velocity"}
+        *leading, last = (words.get(name, name) for name in self.names)
         return (
             f"the combination of {', '.join(leading)} and {last} is farther from the centre of the "
             f"fitted data than {exact_percent(INSIDE)} of them: the answer is an extrapolation"

@@ -18,8 +18,9 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.special import betaln, ndtr, ndtri
 
 from rbfrag.errors import InputError
-from rbfrag.fragility.dependence import Dependence
-from rbfrag.fragility.method import BlockParameters
+from rbfrag.fragility.dependence import EXACT, Dependence, Loadings, Shares
+from rbfrag.fragility.method import arrays
+from rbfrag.fragility.model import FragilityModel
 from rbfrag.fragility.shaking import POINTS, WEIGHTS
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.solver.results import FloatArray
@@ -56,6 +57,8 @@ class Placement:
         component: numbers of horizontal components within a site, shape (n,).
         polarity: +1 or -1, the side of the component that the block faces; `UNKNOWN` where the
             azimuth is not known, shape (n,). Then the component does not count.
+        of_event, of_site, of_component: the :class:`~rbfrag.fragility.dependence.Loadings` of a
+            completed spectral velocity, shape (n,); 0 where it is exact.
 
     Raises:
         InputError: lengths differ, a number is not finite, or a label is none.
@@ -67,6 +70,9 @@ class Placement:
     site: IntArray
     component: IntArray
     polarity: IntArray
+    of_event: FloatArray
+    of_site: FloatArray
+    of_component: FloatArray
 
     @classmethod
     def of(
@@ -78,6 +84,7 @@ class Placement:
         site: ArrayLike = 0,
         component: ArrayLike = 0,
         polarity: ArrayLike = 1,
+        loadings: Loadings = EXACT,
     ) -> Placement:
         """Return a placement from broadcast values; by default one side of one site."""
         real = (np.asarray(part, dtype=np.float64) for part in (l, ln_y))
@@ -85,7 +92,9 @@ class Placement:
             np.asarray(part, dtype=np.int64) for part in (earthquake, site, component, polarity)
         )
         try:
-            parts = np.broadcast_arrays(*(np.atleast_1d(part) for part in (*real, *integers)))
+            parts = np.broadcast_arrays(
+                *(np.atleast_1d(part) for part in (*real, *integers, *loadings))
+            )
         except ValueError as error:
             raise InputError(
                 f"blocks of a portfolio must have columns of one length: {error}"
@@ -93,15 +102,24 @@ class Placement:
         return cls(*parts)
 
     @classmethod
-    def of_numbers(
-        cls, block: BlockParameters, numbers: Mapping[str, FloatArray], **labels: ArrayLike
+    def of_blocks(
+        cls, model: FragilityModel, numbers: Mapping[str, FloatArray], **labels: ArrayLike
     ) -> Placement | None:
-        """Return a placement of blocks from their model inputs; None for blocks without a size."""
+        """Return a placement of blocks from the inputs of a model that completes its spectral
+        velocity as the answers do; None for blocks without a size.
+        """
+        block = model.method.block
         if block.size is None:
             return None
         p = np.sqrt(numbers[block.size])
         ln_y = np.log(numbers[block.strength] * STANDARD_GRAVITY_M_S2 / p)
-        return cls.of(np.log(p), ln_y, **labels)
+        loadings = model.loadings(numbers, arrays())
+        return cls.of(np.log(p), ln_y, loadings=loadings, **labels)
+
+    @property
+    def loadings(self) -> Loadings:
+        """Scatter of a completed spectral velocity in Z of each block."""
+        return Loadings(self.of_event, self.of_site, self.of_component)
 
     def __post_init__(self) -> None:
         columns = vars(self)
@@ -154,7 +172,8 @@ def joint_excess(bound: ArrayLike, other: ArrayLike, r: ArrayLike) -> FloatArray
         other: b.
         r: correlation, -1 to 1.
     """
-    columns = (np.asarray(x, dtype=np.float64) for x in (bound, other, r))
+    # sums of loadings may pass 1 by rounding
+    columns = (np.asarray(x, dtype=np.float64) for x in (bound, other, np.clip(r, -1.0, 1.0)))
     first, second, r = np.broadcast_arrays(*columns)
     first = np.clip(first, -_FARTHEST, _FARTHEST)
     second = np.clip(second, -_FARTHEST, _FARTHEST)
@@ -189,7 +208,7 @@ def _excess_near_one(a: FloatArray, b: FloatArray, r: FloatArray) -> FloatArray:
 
 
 def share_range(
-    probability: ArrayLike, law: Dependence, sites: int, level: float = 0.95
+    probability: ArrayLike, law: Shares, sites: int, level: float = 0.95
 ) -> tuple[FloatArray, FloatArray]:
     """Return the prediction interval of the fraction of identical blocks that fail at several sites
     in one earthquake.
@@ -209,7 +228,7 @@ def share_range(
     return low, high
 
 
-def overdispersion(p: FloatArray, law: Dependence, sites: int) -> FloatArray:
+def overdispersion(p: FloatArray, law: Shares, sites: int) -> FloatArray:
     """Return the mean correlation of the failures of two blocks of :func:`share_range`, at least 0.
 
     Args:
@@ -326,11 +345,21 @@ def pair_correlations(
     either = site & (sign == UNKNOWN)
     component = site & ~either & (blocks.component[i] == blocks.component[j])
     is_same = np.ones(int(either.sum()), dtype=np.bool_)
+    scale = np.sqrt(blocks.loadings.variance)
+    event, of_site, of_component = (part[i] * part[j] for part in blocks.loadings)
+    apart = scale[i] * scale[j]
+    shared = event + site * of_site
     sides = [
         law.of_pairs(d_l[either], d_y[either], is_same, is_same, np.full(is_same.size, side))
         for side in (-1.0, 1.0)
     ]
-    return law.of_pairs(d_l, d_y, site, component, sign), either, sides
+    r = law.of_pairs(d_l, d_y, site, component, sign) + shared + component * of_component
+    completed = (shared + of_component)[either]
+    return (
+        np.clip(r / apart, -1.0, 1.0),
+        either,
+        [np.clip((side + completed) / apart[either], -1.0, 1.0) for side in sides],
+    )
 
 
 def checked(
@@ -383,7 +412,7 @@ _LEAST, _MOST = 1e-9, 1.0 - 1e-9
 
 
 def shaken_share_range(
-    along: FloatArray, tau: float, sigma: float, law: Dependence, sites: int, level: float
+    along: FloatArray, tau: float, sigma: float, law: Shares, sites: int, level: float
 ) -> tuple[float, float]:
     """Return the prediction interval of the failed fraction of identical blocks at several sites in
     one earthquake.

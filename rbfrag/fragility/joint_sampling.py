@@ -74,6 +74,12 @@ class JointSampler:
             _Surface(blocks.l[block], blocks.ln_y[block], of_block, (length, law.l_y))
             for length in (law.l_v, law.l_o)
         )
+        nowhere, groups = np.zeros(block.size), (blocks.earthquake, blocks.site)
+        self._completed = (
+            _Line(nowhere[n], groups[:1], 1.0),
+            _Line(nowhere[n], groups, 1.0),
+            _Line(nowhere, of_block, 1.0),
+        )
 
     def sides(self, draws: int, generator: np.random.Generator) -> FloatArray:
         """Return Z on each side that blocks may face, shape (sides, draws, n).
@@ -85,6 +91,11 @@ class JointSampler:
         common += np.sqrt(law.rho_s) * self._site.draw(draws, generator)
         symmetric = np.sqrt(law.rho_v) * self._symmetric.draw(draws, generator)
         antisymmetric = np.sqrt(law.rho_o) * self._antisymmetric.draw(draws, generator)
+        loadings = self._blocks.loadings
+        if (loadings.variance > 1.0).any():
+            event, site, component = (line.draw(draws, generator) for line in self._completed)
+            common += loadings.event * event + loadings.site * site
+            symmetric += np.append(loadings.component, loadings.component[second]) * component
         z = np.empty((SIDES if second.size else 1, draws, n))
         for k in range(z.shape[0]):
             columns = np.arange(n)
@@ -92,6 +103,7 @@ class JointSampler:
                 columns[second] = np.arange(n, n + second.size)
             facing = np.where(self._blocks.drawn, 1 - 2 * (k % 2), self._blocks.polarity)
             z[k] = common + symmetric[:, columns] + facing * antisymmetric[:, columns]
+        z /= np.sqrt(loadings.variance)
         return z
 
     def normals(self, draws: int, generator: np.random.Generator) -> FloatArray:
@@ -350,10 +362,12 @@ def _parts(law: Dependence, blocks: Placement) -> Iterator[_Part]:
         single = sites.size == 1  # what the earthquake and what the site shares then is one field
         share = law.rho_e + (law.rho_s if single else 0.0)
         yield from _part(blocks, 0, shaken, [np.zeros_like(shaken)], share, law.l_e)
+        yield from _completed(blocks, 0, shaken, [np.zeros_like(shaken)], blocks.of_event)
         for site in sites:
             members = shaken[blocks.site[shaken] == site]
             if not single:
                 yield from _part(blocks, 0, members, [np.zeros_like(members)], law.rho_s, law.l_e)
+            yield from _completed(blocks, 0, members, [np.zeros_like(members)], blocks.of_site)
             yield from _of_components(law, blocks, members)
 
 
@@ -370,6 +384,16 @@ def _of_components(law: Dependence, blocks: Placement, members: Indices) -> Iter
     for rows, several in slots.values():
         for kind, share, length in ((1, law.rho_v, law.l_v), (2, law.rho_o, law.l_o)):
             yield from _part(blocks, kind, rows, several, share, length, law.l_y)
+        yield from _completed(blocks, 1, rows, several, blocks.of_component)
+
+
+def _completed(
+    blocks: Placement, kind: int, member: Indices, slots: Sequence[Indices], loading: FloatArray
+) -> Iterator[_Part]:
+    """Yield what the completion of a spectral velocity adds, for each row of slots."""
+    if loading[member].any():
+        column = (loading / np.sqrt(blocks.loadings.variance))[member, None]
+        yield from ((kind, member, slot, column) for slot in slots)
 
 
 def _part(
@@ -384,7 +408,8 @@ def _part(
     """Yield independent fields of one covariance, one for each row of slots."""
     if share > 0.0 and member.size:
         x, y = blocks.l[member] / length, blocks.ln_y[member] / length_y
-        loading = np.sqrt(share) * _loading(x, y)
+        scale = np.sqrt(share / blocks.loadings.variance[member])
+        loading = scale[:, None] * _loading(x, y)
         yield from ((kind, member, slot, loading) for slot in slots)
 
 
@@ -455,6 +480,8 @@ class LargeCounts:
 
     def __init__(self, law: Dependence, blocks: Placement, count: IntArray) -> None:
         self._law, self._blocks, self._count = law, blocks, count
+        # the completed part of it is taken to change with l as the rest does
+        self._rho_e = float(np.average(law.shares(blocks.loadings).rho_e, weights=count))
         nodes = np.linspace(blocks.l.min(), blocks.l.max(), NODES)
         step = max(float(nodes[1] - nodes[0]), 1e-9)
         self._node = np.rint((blocks.l - nodes[0]) / step).astype(np.intp)
@@ -489,7 +516,7 @@ class LargeCounts:
         Returns:
             Marks x draws; the probability.
         """
-        p, rho = ndtr(bound), self._law.rho_e * (1.0 - common)
+        p, rho = ndtr(bound), self._rho_e * (1.0 - common)
         number = self._count * p
         cells = np.clip(np.rint(bound / _CELL), -_WIDEST, _WIDEST).astype(np.intp) + _WIDEST
         cells = cells * NODES + self._node
@@ -550,7 +577,7 @@ class LargeCounts:
             self._last, self._from[i] + np.minimum(other, other_blocks), side="right"
         )
         apart, _, (opposite, same) = pair_correlations(blocks, i, j, law)
-        event = law.rho_e * np.exp(-np.abs(blocks.l[i] - blocks.l[j]) / law.l_e)
+        event = self._rho_e * np.exp(-np.abs(blocks.l[i] - blocks.l[j]) / law.l_e)
         total = np.zeros(_LEVELS.size)
         for weight, r in ((0.5, apart), (0.25, opposite), (0.25, same)):
             within = ((1.0 - common) * (r - event) + common) / (1.0 - rho)

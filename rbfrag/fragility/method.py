@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache, cached_property
 from operator import mul
-from typing import Any, Literal, NamedTuple
+from typing import Any, Literal, NamedTuple, Protocol
 
 from rbfrag.fragility.dependence import normal_quantile, normal_share
 from rbfrag.fragility.measures import Term
@@ -41,7 +41,7 @@ class ArrayNamespace(NamedTuple):
         cos: its cosine.
         ndtri: its inverse.
         step_sums: Σ (x·d)² and Σ (x·d)⁴ over the steps d of parameters that leave earthquakes
-            out, from :class:`rbfrag.fragility.confidence.ParameterErrors` and the slopes x.
+            out, from :class:`rbfrag.fragility.confidence.ParameterErrors` and the predictor.
     """
 
     log: Callable[[Any], Any]
@@ -53,12 +53,12 @@ class ArrayNamespace(NamedTuple):
     sin: Callable[[Any], Any]
     cos: Callable[[Any], Any]
     ndtri: Callable[[Any], Any]
-    step_sums: Callable[[Any, Sequence[Any]], tuple[Any, Any]]
+    step_sums: Callable[[Any, LinearPredictor], tuple[Any, Any]]
 
 
 SINGLE = ArrayNamespace(
     math.log, lambda x: math.exp(x) if x < _LARGEST_EXPONENT else math.inf, math.sqrt, normal_share,
-    max, min, math.sin, math.cos, normal_quantile, lambda errors, x: errors.step_sums(*x),
+    max, min, math.sin, math.cos, normal_quantile, lambda errors, x: errors.sums_of_number(x),
 )  # fmt: skip
 """For single numbers."""
 
@@ -69,23 +69,9 @@ def arrays() -> ArrayNamespace:
     import numpy as np
     from scipy.special import ndtr, ndtri
 
-    def step_sums(errors: Any, x: Sequence[Any]) -> tuple[Any, Any]:
-        # more terms than earthquakes: here the products are faster than the polynomials
-        steps, columns = np.array(errors.steps), np.stack(np.broadcast_arrays(*x))
-        total, fourths = np.empty((2, columns.shape[1]))
-        # so few at a time stay near the processor, and BLAS starts no threads of its own
-        for start in range(0, columns.shape[1], 512):
-            part = slice(start, start + 512)
-            squares = steps @ columns[:, part]
-            squares *= squares
-            np.add.reduce(squares, axis=0, out=total[part])
-            squares *= squares
-            np.add.reduce(squares, axis=0, out=fourths[part])
-        return total, fourths
-
     return ArrayNamespace(
         np.log, np.exp, np.sqrt, ndtr, np.maximum, np.minimum, np.sin, np.cos,
-        ndtri, step_sums,
+        ndtri, lambda errors, x: errors.sums_of_arrays(x),
     )  # fmt: skip
 
 
@@ -97,12 +83,23 @@ class LinearPredictor(NamedTuple):
         slopes: derivatives of eta by the parameters.
         log_sigma: logarithm of the scatter, for models with normal scatter of a critical value.
         sigma_slopes: its derivatives by the parameters.
+        node_slopes: where a spectral velocity is completed by a regression, derivatives by the
+            coefficients and the scatter of the regression at the block's size.
+        node_weights: weights of the nodes of p² in these.
     """
 
     eta: Any
     slopes: tuple[Any, ...]
     log_sigma: Any = None
     sigma_slopes: tuple[Any, ...] = ()
+    node_slopes: tuple[Any, ...] = ()
+    node_weights: tuple[Any, ...] = ()
+
+    @property
+    def all_slopes(self) -> tuple[Any, ...]:
+        """Derivatives by the parameters and those of the regression at each node."""
+        at_nodes = (weight * slope for weight in self.node_weights for slope in self.node_slopes)
+        return (*self.slopes, *at_nodes)
 
 
 def linear(b: Sequence[float], *features: Any) -> LinearPredictor:
@@ -142,13 +139,6 @@ LOGIT = Link(
     lambda p, ns: ns.log(p / (1.0 - p)),
     r"1/(1 + e^{-\eta})",
 )
-LOGLOG = Link(
-    "loglog",
-    lambda eta, ns: ns.exp(-ns.exp(-eta)),
-    lambda eta, ns: ns.exp(-eta - ns.exp(-eta)),
-    lambda p, ns: -ns.log(-ns.log(p)),
-    r"\exp(-e^{-\eta})",
-)
 
 
 class MechanicalBound(NamedTuple):
@@ -178,20 +168,11 @@ class MechanicalBound(NamedTuple):
 
 
 ABOVE_TWICE_PGV = MechanicalBound(
-    lambda v: v["y_m_s"] >= 2.0 * v["intensity_m_s"],
+    lambda v: v["y_m_s"] >= 2.0 * v["pgv_m_s"],
     "y_m_s",
-    "PGV{intensity_m_s} is at most half the toppling velocity k_r g/p{y_m_s}: no excursion from "
+    "PGV{pgv_m_s} is at most half the toppling velocity k_r g/p{y_m_s}: no excursion from "
     "rest topples the block",
 )
-_STRONG_KR = 0.3
-"""k_r in k' = ln(1 + k_r/0.3): a strong block needs a PGA above k_r, also where PGA is unknown."""
-
-
-def log_strength(v: Values, ns: ArrayNamespace) -> Any:
-    """Return k' = ln(1 + k_r/0.3)."""
-    return ns.log(1.0 + v["kr"] / _STRONG_KR)
-
-
 ABOVE_SPECTRUM = MechanicalBound(
     lambda v: v["y_m_s"] >= v["intensity_m_s"],
     "y_m_s",
@@ -221,8 +202,10 @@ class BlockParameters:
         rejects: the combinations of values that no block has.
         safe_steps: how many steps the stored grid goes on for fits above its strongest block, all
             of them safe by mechanics.
-        judged_kr: strength up to which fits are judged, where their grid goes on far beyond what
-            fails.
+        smallest_p2: size [1/s²] from which on answers are within the fitted range; blocks below
+            are fitted too.
+        completed_from: motions whose spectra complete a spectral velocity: those that shake a block
+            which fits are judged on, or all.
         points: how stored combinations become what a fit reads (`rbfrag.fragility.fit.data`): of
             blocks of any strength, of stored blocks under scaled records, or of displacements.
         support: what answers for its own kind take for granted of how a block stands; empty for
@@ -241,7 +224,8 @@ class BlockParameters:
     adjust: Callable[[dict[str, Any], ArrayNamespace], None] | None = None
     rejects: tuple[MechanicalBound, ...] = ()
     safe_steps: int = 0
-    judged_kr: float = math.inf
+    smallest_p2: float = 0.0
+    completed_from: Literal["judged", "all"] = "judged"
     points: Literal["strengths", "scaled_records", "displacements"] = "strengths"
     support: str = ""
 
@@ -275,17 +259,29 @@ class BlockParameters:
                 filled[name] = np.where(np.isnan(values[name]), inputs[name], values[name])
         return filled
 
-    def completed(self, inputs: Values, term: Term, ns: ArrayNamespace) -> dict[str, Any]:
+    def completed(
+        self,
+        inputs: Values,
+        term: Term,
+        ns: ArrayNamespace,
+        velocity: Callable[[Values, ArrayNamespace], Values] | None = None,
+    ) -> dict[str, Any]:
         """Return the inputs with the derived variables of the formulas.
 
         These are ``intensity_m_s`` and, for a block of a size, ``p`` [1/s] and ``y_m_s`` = k g/p.
         Values that no logarithm takes are left to the caller.
+
+        Args:
+            velocity: returns the spectral velocity and its scatter by name, of a model that reads
+                them.
         """
         values = dict(inputs)
         if self.adjust is not None:
             self.adjust(values, ns)
         if self.size is not None:
             values["p"] = p = ns.sqrt(values[self.size])
+        if velocity is not None:
+            values |= velocity(values, ns)
         values["intensity_m_s"] = term.intensity_m_s(values)
         if self.size is not None:
             values["y_m_s"] = values[self.strength] * STANDARD_GRAVITY_M_S2 / p
@@ -305,6 +301,17 @@ TOPPLING_BLOCK = BlockParameters(
     "(kind='rocking')",
 )  # fmt: skip
 """Blocks known by p² [1/s²] and the yield acceleration coefficient k_r."""
+
+
+class Factor(Protocol):
+    """A factor h on eta, of size or restitution, which has no parameter to be fitted."""
+
+    @property
+    def formula(self) -> str:
+        """The factor as mathtext."""
+
+    def of(self, values: Values, ns: ArrayNamespace) -> Any:
+        """Return h from completed values by name."""
 
 
 class SizeFactor(NamedTuple):
@@ -328,14 +335,39 @@ class SizeFactor(NamedTuple):
             return rf"p^{{{self.a:g}}}"
         return rf"\exp({self.a:g}\,\ln p - {self.b:g}\,\ln^2 p)"
 
-    def of(self, p: Any, ns: ArrayNamespace) -> Any:
-        """Return h at the frequency parameter p [1/s]."""
-        l = ns.log(ns.minimum(ns.maximum(p, _LEAST_P), _GREATEST_P))  # noqa: E741  as in the formula
+    def of(self, values: Values, ns: ArrayNamespace) -> Any:
+        """Return h at the frequency parameter p [1/s] among the values."""
+        l = ln_size(values, ns)  # noqa: E741  as in the formula
         return ns.exp((self.a - self.b * l) * l)
 
 
 _LEAST_P, _GREATEST_P = math.sqrt(0.1), math.sqrt(30.0)
-"""Ends of the sizes that A and B were chosen for [1/s]."""
+"""Ends of the sizes that fits read [1/s]."""
+
+
+def ln_size(values: Values, ns: ArrayNamespace) -> Any:
+    """Return l = ln p, p in 1/s, limited to the sizes that fits read, p² from 0.1 to 30 1/s²."""
+    return ns.log(ns.minimum(ns.maximum(values["p"], _LEAST_P), _GREATEST_P))
+
+
+Velocity = Callable[[Mapping[float, Any], Any, ArrayNamespace], Any]
+"""Logarithm of a block-relative spectral velocity from spectral ordinates [g] by period [s], p
+[1/s] and functions."""
+
+
+class SpectralPredictor(NamedTuple):
+    """The block-relative spectral velocity that a form reads; its last parameter multiplies ln of
+    it.
+
+    Args:
+        ln_velocity: its logarithm.
+        over: the measure that it is regressed on as a ratio to: PGV or PGA; empty for none.
+        optional: measures that the regression reads where they are given.
+    """
+
+    ln_velocity: Velocity
+    over: str = ""
+    optional: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -346,9 +378,6 @@ class Form:
         parameters: their names; the method's `exponent` stands last and may be missing.
         formula: eta before the size factor and its slopes, from the parameters, values by name and
             functions.
-        rank: place among the methods on this measure by falling skill on held-out earthquakes
-            (docs/evidence/model-choice.md); those after 0 are there to be compared with, and
-            answer by themselves only where no other does.
         bounds: what mechanics forbids.
         start: where the search for the likeliest parameters begins; empty where none is needed.
         size_factor: what eta is multiplied by; None for nothing.
@@ -357,19 +386,26 @@ class Form:
         equation: eta before the size factor of that sum, <sum>, and of parameters <name>,
             <+name> with their sign, <exp name>, as mathtext.
         where: what the symbols mean, likewise.
-        advice: what every answer says of a form that knows little; empty for nothing.
+        advice: what every answer says of a form that knows little; with a spectral velocity what
+            an answer from a single measure says; empty for nothing.
+        hint: what an answer says that leaves out given measures; empty for nothing.
+        velocity: the spectral velocity that it reads; None for none.
+        positive: parameters that a fit holds above zero, because stronger blocks would fail more
+            often.
     """
 
     parameters: tuple[str, ...]
     formula: Callable[[Sequence[float], Values, ArrayNamespace], LinearPredictor]
-    rank: int
     bounds: tuple[MechanicalBound, ...] = ()
     start: tuple[float, ...] = ()
-    size_factor: SizeFactor | None = None
+    size_factor: Factor | None = None
     terms: tuple[str, ...] = ()
     equation: str = "<sum>"
     where: str = ""
     advice: str = ""
+    hint: str = ""
+    velocity: SpectralPredictor | None = None
+    positive: tuple[str, ...] = ()
 
     def unscaled(
         self, parameters: Sequence[float], values: Values, ns: ArrayNamespace
@@ -381,7 +417,7 @@ class Form:
             values: completed values by name.
         """
         formula = self.formula(parameters, values, ns)
-        return formula, 1.0 if self.size_factor is None else self.size_factor.of(values["p"], ns)
+        return formula, 1.0 if self.size_factor is None else self.size_factor.of(values, ns)
 
     def eta(
         self, parameters: Sequence[float], values: Values, ns: ArrayNamespace

@@ -3,17 +3,27 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple, cast
 
 from rbfrag.db.model_file import MODEL_FORM, ModelRow
 from rbfrag.errors import InputError, ModelError
+from rbfrag.fragility.completion import (
+    MOMENTS,
+    Completion,
+    Regression,
+    decode_regression,
+    encode_regressions,
+    is_exact,
+    key_of,
+    used_inputs,
+)
 from rbfrag.fragility.confidence import ParameterErrors, Quantiles, packed
-from rbfrag.fragility.dependence import Dependence
+from rbfrag.fragility.dependence import EXACT, Dependence, Loadings
 from rbfrag.fragility.domain import RATIOS, Ratio, Spread, ratios_of, stored_spread
 from rbfrag.fragility.measures import ABOUT_SCATTER, CREDIBLE, HIGHEST, LOWEST, TERMS, Term
-from rbfrag.fragility.method import ArrayNamespace, Form, MechanicalBound, Method
+from rbfrag.fragility.method import ArrayNamespace, Form, LinearPredictor, MechanicalBound, Method
 from rbfrag.fragility.methods import method_named, method_names
 from rbfrag.results.diagnostic import Diagnostic
 
@@ -28,6 +38,9 @@ AT_REST = "unstable without shaking: check dip and friction"
 
 IS_ESTIMATED = "dependence_estimated"
 """Diagnostic of a fit: whether the dependence model was part of it."""
+
+LOSSES = "losses_by_inputs"
+"""Diagnostic of a fit: log losses on earthquakes held out by the measures that are given."""
 
 NO_EVENT_RANGE = Diagnostic(
     "no prediction interval for a single earthquake: no dependence model is stored with this "
@@ -79,6 +92,10 @@ class FragilityModel:
         spread: how the fitted points scatter; None where the row does not say it.
         data: the database that it is stored in, as people call it; None of a row by itself.
         complete: returns a row with its dependence model; None where it cannot be estimated.
+        regress: returns the regression of the spectral velocity on some measures, with what is to
+            be said of it, where the row has none for them.
+        completion: the spectral velocity from what is given; None of a model that reads none, and
+            before :meth:`for_inputs`.
     """
 
     row: ModelRow
@@ -92,6 +109,12 @@ class FragilityModel:
     spread: Spread | None = None
     data: str | None = None
     complete: Callable[[ModelRow], ModelRow] | None = field(default=None, compare=False, repr=False)
+    regress: Regress | None = field(default=None, compare=False, repr=False)
+    completion: Completion | None = None
+    completed_models: dict[tuple[str, ...], FragilityModel] = field(
+        default_factory=dict, compare=False, repr=False
+    )
+    """What :meth:`for_inputs` has returned for some measures."""
     ranges: dict[tuple[str, ...], list[tuple[str, float, float]]] = field(
         default_factory=dict, compare=False, repr=False
     )
@@ -107,12 +130,14 @@ class FragilityModel:
         row: ModelRow,
         data: str | None = None,
         complete: Callable[[ModelRow], ModelRow] | None = None,
+        regress: Regress | None = None,
     ) -> FragilityModel:
         """Return the model of a stored row.
 
         Args:
             data: the database that it is stored in, as people call it.
             complete: returns a row with its dependence model, if it can be estimated.
+            regress: returns the regression on some measures that the row has none for.
 
         Raises:
             ModelError: the model is of another form, this rbfrag does not know its term or
@@ -155,7 +180,9 @@ class FragilityModel:
                 "of another size: fit it again"
             )
         term = TERMS[row.term]
-        notes = (Diagnostic(form.advice, "model_choice"),) if form.advice else ()
+        notes: tuple[Diagnostic, ...] = ()
+        if form.advice and form.velocity is None:
+            notes = (Diagnostic(form.advice, "model_choice"),)
         if row.diagnostics.get("recorded_events") == 0:
             notes = (*notes, SYNTHETIC)
         return cls(
@@ -170,7 +197,126 @@ class FragilityModel:
             spread=stored_spread(row.name, row.diagnostics),
             data=data,
             complete=complete,
+            regress=regress,
         )
+
+    def for_inputs(self, names: Collection[str]) -> FragilityModel:
+        """Return the model that completes its spectral velocity from the given measures.
+
+        Args:
+            names: what is given of block and shaking.
+
+        Raises:
+            ModelError: there is no regression on these measures.
+        """
+        velocity = self.form.velocity
+        if velocity is None:
+            return self
+        used = used_inputs(TERMS[self.row.term], velocity, names)
+        if self.completion is not None and self.completion.used == used:
+            return self
+        model = self.completed_models.get(used)
+        if model is None:
+            model = self._completed_from(used)
+            self.completed_models[used] = model
+        return model
+
+    def _completed_from(self, used: tuple[str, ...]) -> FragilityModel:
+        velocity, notes = self.form.velocity, self.notes
+        assert velocity is not None
+        regression, errors, row = None, self.errors, self.row
+        if not is_exact(used):
+            regression = decode_regression(self.row.completions, used)
+            if regression is None and self.regress is not None:
+                regression, warnings = self.regress(self.row, used)
+                notes = (*notes, *warnings)
+                if regression is not None:  # models travel as rows
+                    stored = encode_regressions({key_of(used): regression})
+                    row = replace(
+                        row, completions="\n".join(filter(None, (row.completions, stored)))
+                    )
+            if regression is None:
+                raise ModelError(
+                    f"model {self.name!r} has no regression of its spectral velocity on "
+                    f"{' and '.join(used)}: fit it again in a database with response spectra"
+                )
+            nodes = tuple(tuple(map(tuple, steps)) for steps in regression.steps)
+            errors = replace(errors, node_steps=nodes) if nodes else errors
+        if self.form.advice and len({*used} - {"magnitude"}) == 1:
+            notes = (*notes, Diagnostic(self.form.advice, "model_choice"))
+        completion = Completion(velocity, used, regression)
+        term = replace(self.term, inputs=used)
+        return replace(
+            self, row=row, term=term, errors=errors, notes=notes, completion=completion,
+            ranges={}, ratios={},
+        )  # fmt: skip
+
+    def completed(self, inputs: Mapping[str, Any], ns: ArrayNamespace) -> dict[str, Any]:
+        """Return the inputs with the derived variables of the formulas; see
+        :meth:`rbfrag.fragility.method.BlockParameters.completed`.
+        """
+        velocity = None if self.completion is None else self.completion.velocities
+        return self.method.block.completed(inputs, self.term, ns, velocity)
+
+    def moved(self, step: Sequence[float]) -> FragilityModel:
+        """Return the model with a step added to its parameters, and to its regression if the step
+        goes on with the coefficients and the scatter at each of its sizes.
+        """
+        k, completion = len(self.parameters), self.completion
+        parameters = tuple(b + d for b, d in zip(self.parameters, step[:k], strict=True))
+        if completion is not None and completion.regression is not None and len(step) > k:
+            completion = replace(completion, regression=completion.regression.moved(step[k:]))
+        return replace(self, parameters=parameters, completion=completion)
+
+    def linear_predictor(
+        self, values: Mapping[str, Any], ns: ArrayNamespace
+    ) -> tuple[LinearPredictor, Any]:
+        """Return eta and its slopes before a factor, and that factor.
+
+        With the scatter σ of a completed spectral velocity, η* = h η/D with D² = 1 + (h b σ)² and
+        b the parameter of ln of the velocity. Slopes of η*, over h/D: those of η, that of b less
+        η* h b σ²/D; b u by the coefficients of the regression with regressors u; and
+        -η* h b² σ/D by σ.
+
+        Args:
+            values: as :meth:`completed` returns them.
+        """
+        unscaled, h = self.form.unscaled(self.parameters, values, ns)
+        moments = values.get(MOMENTS)
+        if moments is None:
+            return unscaled, h
+        b, sigma = self.parameters[-1], moments.sigma
+        reach = h * (b * sigma)
+        root = ns.sqrt(1.0 + reach * reach)
+        factor = h / root
+        pull = unscaled.eta * factor * reach / root
+        if not self.errors.node_steps:
+            return unscaled, factor
+        predictor = LinearPredictor(
+            unscaled.eta,
+            (*unscaled.slopes[:-1], unscaled.slopes[-1] - pull * sigma),
+            node_slopes=(*(b * u for u in moments.regressors), -b * pull),
+            node_weights=moments.weights,
+        )
+        return predictor, factor
+
+    def loadings(self, numbers: Mapping[str, Any], ns: ArrayNamespace) -> Loadings:
+        """Return what the completion of the spectral velocity adds to the dependence of blocks.
+
+        Args:
+            numbers: parameters of the blocks by name.
+        """
+        if self.completion is None or self.completion.regression is None:
+            return EXACT
+        values, block = dict(numbers), self.method.block
+        if block.adjust is not None:
+            block.adjust(values, ns)
+        values["p"] = ns.sqrt(values[str(block.size)])
+        sigma, of_event, of_site = self.completion.scatter(values, ns)
+        h = 1.0 if self.form.size_factor is None else self.form.size_factor.of(values, ns)
+        reach = h * (self.parameters[-1] * sigma)
+        parts = of_event, of_site - of_event, 1.0 - of_site
+        return Loadings(*(reach * ns.sqrt(ns.maximum(part, 0.0)) for part in parts))
 
     @property
     def dependence(self) -> Dependence | None:
@@ -273,6 +419,8 @@ class FragilityModel:
         block, domain, ranges = self.method.block, self.row.domain, []
         for name in key:
             low, high = LOWEST, HIGHEST
+            if name == MOMENTS:
+                continue
             if name in block.sigmas or name in ABOUT_SCATTER:
                 low = 0.0
             elif name in domain or name not in block.options:
@@ -322,16 +470,19 @@ class FragilityModel:
                 for each that one may be.
         """
         del inputs
-        unscaled, h = self.form.unscaled(self.parameters, values, ns)
+        unscaled, h = self.linear_predictor(values, ns)
         eta = unscaled.eta * h
         link = self.method.link.probability
         middle = link(eta, ns)
         log_sigma = unscaled.log_sigma
         if quantiles is None:
             return Answer(middle, None, None, eta, log_sigma)
-        reach = h * self.errors.half_width(unscaled.slopes, quantiles, ns)
+        reach = h * self.errors.half_width(unscaled, quantiles, ns)
         return Answer(middle, link(eta - reach, ns), link(eta + reach, ns), eta, log_sigma)
 
+
+Regress = Callable[[ModelRow, tuple[str, ...]], tuple[Regression | None, tuple[Diagnostic, ...]]]
+"""Returns the regression of a model's spectral velocity on measures, and what is said of it."""
 
 Model = ModelRow | FragilityModel | str
 """A model as callers give it: itself, as it is stored, or by the name of a stored one."""

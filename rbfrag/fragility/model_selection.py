@@ -8,15 +8,23 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Collection, Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from os import PathLike
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 from rbfrag.db.location import DEFAULT_NAME, REFERENCE, data_place, is_unnamed, reference_file
-from rbfrag.db.model_file import ModelRow, answers_special_questions, held_out_loss, unknown_model
-from rbfrag.errors import InputError, UnknownModelError
+from rbfrag.db.model_file import (
+    COMPARED,
+    ModelRow,
+    answer_order,
+    held_out_loss,
+    unknown_model,
+)
+from rbfrag.errors import InputError, ModelError, UnknownModelError
+from rbfrag.fragility.completion import Regression
 from rbfrag.fragility.describe import fitted_number
 from rbfrag.fragility.measures import (
     ABOUT_SCATTER,
@@ -24,15 +32,17 @@ from rbfrag.fragility.measures import (
     SCATTERED,
     TERMS,
     least_inputs,
+    missing_inputs,
     terms_from,
 )
 from rbfrag.fragility.method import TOPPLING_BLOCK, BlockParameters
 from rbfrag.fragility.methods import methods
-from rbfrag.fragility.model import FragilityModel, Model
+from rbfrag.fragility.model import LOSSES, FragilityModel, Model
 from rbfrag.results.diagnostic import Diagnostic
 from rbfrag.results.numbers import count_of
 from rbfrag.results.result import ResultList, TextLine, TextTable
-from rbfrag.vocabulary.quantities import INTENSITY, word_of
+from rbfrag.vocabulary.quantities import word_of
+from rbfrag.vocabulary.spectral import SPECTRUM_PERIODS_S, input_of, period_of, spectral_names
 
 SHIPPED = "the built-in data set"
 """Name of the data set that answers where no other database is given or exists."""
@@ -78,7 +88,7 @@ class _Store:
         model = self.models.get(row.name)
         if model is None:
             complete = None if self.source is None else self._with_dependence
-            model = FragilityModel.from_row(row, data_name(self.place), complete)
+            model = FragilityModel.from_row(row, data_name(self.place), complete, self._regression)
             self.models[row.name] = model
         return model
 
@@ -86,6 +96,13 @@ class _Store:
         from rbfrag.fragility.fit.stored import with_dependence
 
         return with_dependence(row, self.source)
+
+    def _regression(
+        self, row: ModelRow, used: tuple[str, ...]
+    ) -> tuple[Regression | None, tuple[Diagnostic, ...]]:
+        from rbfrag.fragility.fit.stored import regression_of
+
+        return regression_of(row, used, REFERENCE if self.source is None else self.source)
 
 
 _SHIPPED = str(REFERENCE)
@@ -164,15 +181,14 @@ def find_model(
                 f"model {chosen.name!r} is for {_failure(chosen.criterion)}, not for "
                 f"{_failure(rotation_deg)}"
             )
-    for name in chosen.term.inputs:
-        if name not in names:
-            raise InputError(
-                f"model {chosen.name!r} requires {' and '.join(chosen.term.inputs)} "
-                f"({chosen.term.title}); given: {_measures(names)}. Add it, or choose a model of "
-                "another term",
-                fields=INTENSITY,
-            )
-    return chosen
+    term = TERMS.get(chosen.row.term, chosen.term)
+    if missing_inputs(term, names):
+        raise InputError(
+            f"model {chosen.name!r} requires {' and '.join(term.inputs or ('sa_g',))} "
+            f"({term.title}); given: {_measures(names)}. Add it, or choose a model of another term",
+            fields=MEASURES,
+        )
+    return chosen.for_inputs(names)
 
 
 def suited_models(
@@ -184,10 +200,8 @@ def suited_models(
 ) -> list[FragilityModel]:
     """Return one stored model for each suitable set of intensity measures, the recommended first.
 
-    One of the record's own spectrum X(p), or of the given rotation, comes first, then the chosen
-    default, the lowest log loss on held-out earthquakes, and without scores the most predictors
-    (docs/theory/fragility.md, "Which model answers"). Methods kept for comparison answer where no
-    other does.
+    The order is that of :func:`rbfrag.db.model_file.answer_order` (docs/theory/fragility.md, "Which
+    model answers"). Methods kept for comparison answer where no other does.
 
     Arguments as for :func:`find_model`.
     """
@@ -200,14 +214,27 @@ def suited_models(
 def unused_measures(model: FragilityModel, names: Collection[str]) -> tuple[Diagnostic, ...]:
     """Return warnings about intensity measures that a model does not use."""
     read = model.term.inputs
-    return tuple(
-        Diagnostic(
-            f"{name} was not used: model {model.name} uses {' and '.join(read)}", "unused_measures"
-        )
+    unused = [
+        name
         for name in names
         if name in MEASURES and name not in read
         if name not in ABOUT_SCATTER or SCATTERED.get(name, read[0]) not in read
-    )
+    ]
+    uses = " and ".join(dict.fromkeys(map(input_of, read)))
+    texts = []
+    if model.form.velocity is not None and ("pga_g" in read or spectral_names(read)):
+        # SA is used, but not at these periods
+        spectral = spectral_names(unused)
+        unused = [name for name in unused if name not in spectral]
+        short = [name for name in spectral if (period_of(name) or 0.0) < SPECTRUM_PERIODS_S[0]]
+        if short and "pga_g" in read:
+            texts.append("spectral accelerations below 0.1 s were not used: PGA stands for them")
+        if len(short) < len(spectral):
+            texts.append("spectral accelerations at further periods were not used: 21 suffice")
+    texts += [f"{name} was not used: model {model.name} uses {uses}"
+              for name in dict.fromkeys(map(input_of, unused))]  # fmt: skip
+    hints = [Diagnostic(model.form.hint, "model_choice")] if texts and model.form.hint else []
+    return (*(Diagnostic(text, "unused_measures") for text in texts), *hints)
 
 
 def _suited_in(
@@ -216,8 +243,9 @@ def _suited_in(
     possible = terms_from(names)
     if not possible:
         raise InputError(
-            f"{_measures(names)} is given: a prediction requires {_enough(TERMS)}, or a motion",
-            fields=INTENSITY,
+            f"{_measures(names)} is given: a prediction requires {_enough(TERMS)}, or a motion, or "
+            "magnitude with rjb_km and vs30_m_s",
+            fields=(*MEASURES, "rjb_km", "vs30_m_s"),
         )
     block = block_of(names)
     kind = block.kind if kind is None else kind
@@ -235,34 +263,30 @@ def _suited_in(
     named = [row.name for row in of_kind if TERMS[row.term].by_name and not row.is_default]
     of_kind = [row for row in of_kind if row.name not in named]
 
-    def preference(row: ModelRow) -> tuple[bool, bool, float, int, int]:
-        return (
-            not answers_special_questions(row),
-            not row.is_default,
-            held_out_loss(row),
-            -len(TERMS[row.term].inputs),
-            possible.index(row.term),
-        )
-
-    suited = sorted((row for row in of_kind if row.term in possible), key=preference)
-    if suited:
-        block = store.model(suited[0]).method.block
+    suited = sorted((row for row in of_kind if row.term in possible), key=answer_order)
+    for row in suited:
+        with suppress(ModelError):
+            block = store.model(row).method.block
+            break
     if not MEASURES.issuperset(names):
         check_numbers(kind, block, names)
     _check_criterion(kind, block, rotation_deg)
     best: dict[str, FragilityModel] = {}
+    unreadable: list[ModelError] = []
     for row in suited:
+        compared = row.method in COMPARED and not row.is_default
+        if row.term in best or (compared and best):
+            continue
         if block.criterion_of(row.diagnostics) != rotation_deg:
             continue
-        before = best.get(row.term)
-        if before is None:
-            best[row.term] = store.model(row)
-        elif preference(before.row) == preference(row):
-            # neither has a score: the rank of the methods decides, which loads them
-            best[row.term] = min(before, store.model(row), key=lambda model: model.form.rank)
+        try:
+            best[row.term] = store.model(row).for_inputs(names)
+        except ModelError as error:  # another may answer
+            unreadable.append(error)
     if best:
-        usual = [m for m in best.values() if m.form.rank == 0 or m.row.is_default]
-        return usual or [*best.values()]
+        return [*best.values()]
+    if unreadable:
+        raise unreadable[0]
     if suited:
         have = ", ".join(
             f"{row.name} ({_failure(block.criterion_of(row.diagnostics))})" for row in of_kind
@@ -460,18 +484,20 @@ class ModelList(ResultList):
         if defaults:
             yield TextLine("Default", ", ".join(defaults))
 
-    def tables(self, *, verbose: bool = False) -> Iterator[TextTable]:  # noqa: ARG002
-        """Yield the models with their predictors and log loss."""
+    def tables(self, *, verbose: bool = False) -> Iterator[TextTable]:
+        """Yield the models with their log loss by what is given of the shaking."""
         headers = ("model", "kind", "predictors", "log loss", "default")
-        losses = [row["log_loss_kr05"] or row["log_loss"] for row in self.rows()]
-        yield TextTable(
-            headers,
-            [
-                (row["name"], row["kind"], ", ".join(map(word_of, row["reads"])),
-                 "" if loss is None else f"{loss:.4f}", "yes" if row["is_default"] else "")
-                for row, loss in zip(self.rows(), losses, strict=True)
-            ],
-        )  # fmt: skip
+        cells: list[tuple[str, str, str, str, str]] = []
+        for row in self.rows():
+            default = "yes" if row["is_default"] else ""
+            losses = row["losses_by_inputs"] or [row]
+            for losses_of in losses if verbose else filter(_is_usual, losses):
+                loss = losses_of["log_loss_kr05"] or losses_of["log_loss"]
+                reads = _predictors(losses_of["reads"])
+                text = "" if loss is None else f"{loss:.4f}"
+                cells.append((row["name"], row["kind"], reads, text, default))
+                default = ""
+        yield TextTable(headers, cells)
 
     def rows(self) -> list[dict[str, Any]]:
         """Return the models under the keys of the JSON contract."""
@@ -485,6 +511,10 @@ class ModelList(ResultList):
                 "reads": list(TERMS[row.term].inputs) if row.term in TERMS else [],
                 "log_loss": _finite(held_out_loss(row, "log_loss_held_out")),
                 "log_loss_kr05": _finite(held_out_loss(row, "log_loss_held_out_kr05")),
+                "losses_by_inputs": [
+                    {"reads": inputs.split(), **losses}
+                    for inputs, losses in cast("Any", row.diagnostics.get(LOSSES, {})).items()
+                ],
                 "events": row.diagnostics.get("events"),
                 "sensitive_share": row.diagnostics.get("sensitive_share"),
                 "domain": dict(row.domain),
@@ -492,6 +522,23 @@ class ModelList(ResultList):
             }
             for row in sorted(self.models, key=lambda row: (row.kind, held_out_loss(row)))
         ]
+
+
+def _is_usual(losses: Mapping[str, Any]) -> bool:
+    """Return whether a set of measures is listed without being asked for."""
+    ordinates = len(spectral_names(losses["reads"]))
+    return ordinates in (0, 1, 3, len(SPECTRUM_PERIODS_S))
+
+
+def _predictors(reads: Sequence[str]) -> str:
+    """Describe a set of measures in a few words."""
+    spectrum = spectral_names(reads)
+    if len(spectrum) > _MOST_LISTED:
+        return ", ".join([*map(word_of, reads[: -len(spectrum)]), f"SA at {len(spectrum)} periods"])
+    return ", ".join(map(word_of, reads))
+
+
+_MOST_LISTED = 5
 
 
 def _finite(loss: float) -> float | None:

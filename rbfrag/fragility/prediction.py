@@ -13,8 +13,9 @@ from typing import TYPE_CHECKING, Any, Literal, TypeVar
 from rbfrag.errors import InputError
 from rbfrag.fragility import describe
 from rbfrag.fragility.confidence import Quantiles, checked_level, quantiles_of
-from rbfrag.fragility.measures import ABOUT_SCATTER
-from rbfrag.fragility.method import SINGLE
+from rbfrag.fragility.dependence import Loadings
+from rbfrag.fragility.measures import ABOUT_SCATTER, most_over_pga
+from rbfrag.fragility.method import SINGLE, arrays
 from rbfrag.fragility.model import AT_REST, NO_EVENT_RANGE, FragilityModel
 from rbfrag.fragility.model_selection import check_numbers
 from rbfrag.results.diagnostic import Diagnostic, diagnostics
@@ -315,18 +316,23 @@ def answer_given(
 ) -> Prediction | PredictionArray:
     """Return the prediction of one model from inputs by name; see :func:`predict`."""
     if sites is not None:
+        model = model.for_inputs(inputs)
         answer = answer_given(model, inputs, level, nan=nan, interval=interval, weights=weights)
         return _at_sites(answer, model, sites, inputs, weights)
+    model = model.for_inputs(inputs)
     if not inputs.keys() >= {*model.method.block.names}:
         check_numbers(model.kind, model.method.block, inputs)
     quantiles = quantiles_of(checked_level(level))
     # Kept apart: most questions are about certain blocks and shaking, and need no more.
-    certain, scatter, tau = model, None, None
+    certain, scatter, uncertain, tau = model, None, None, None
     if not ABOUT_SCATTER.isdisjoint(inputs):
-        from rbfrag.fragility.shaking import Scatter, ShakenModel
+        from rbfrag.fragility.shaking import Scatter, ShakenModel, with_uncertain_velocity
 
         tau = inputs.get("pgv_tau")
         scatter, inputs = Scatter.of(model.term, inputs)
+        uncertain = scatter
+        if scatter is not None:
+            scatter, inputs = with_uncertain_velocity(model, scatter, inputs)
     if weights is not None:
         from rbfrag.fragility.uncertain import drawn_model
 
@@ -349,9 +355,9 @@ def answer_given(
             model = UncertainModel.over(certain, possible=possible, points=points)
     if singles is not None:
         answer = _answer_single(model, singles, quantiles)
-        if scatter is None:
+        if uncertain is None:
             return answer
-        about = scatter.in_numbers(singles, tau)
+        about = uncertain.in_numbers(singles, tau)
         return type(answer)(**(vars(answer) | {"shaking": about}))
     # Kept apart so that single numbers do not load numpy.
     from rbfrag.fragility.prediction_array import predict_many
@@ -386,9 +392,21 @@ def _at_sites(
         return _shaken_at_sites(answer, model, int(sites), inputs)
     from rbfrag.fragility.joint import share_range
 
-    ends = share_range(answer.probability, model.dependence, int(sites), answer.level)
+    law = model.dependence.shares(_loadings(model, inputs))
+    ends = share_range(answer.probability, law, int(sites), answer.level)
     low, high = map(float, ends) if isinstance(answer, Prediction) else ends
     return type(answer)(**(vars(answer) | {"event_low": low, "event_high": high}))
+
+
+def _loadings(model: FragilityModel, inputs: Mapping[str, Any]) -> Loadings:
+    """Return what the completion of the spectral velocity adds to the dependence of the blocks."""
+    block = model.method.block
+    numbers = {name: inputs[name] for name in (*block.names, *block.options) if name in inputs}
+    if all(map(is_single, numbers.values())):
+        return model.loadings(numbers, SINGLE)
+    import numpy as np
+
+    return model.loadings({name: np.asarray(v) for name, v in numbers.items()}, arrays())
 
 
 NOT_SHARED = Diagnostic(
@@ -403,12 +421,13 @@ def _shaken_at_sites(
     answer: A, model: FragilityModel, sites: int, inputs: Mapping[str, ArrayLike]
 ) -> A:
     from rbfrag.fragility.joint import shaken_share_range
-    from rbfrag.fragility.shaking import Scatter
+    from rbfrag.fragility.shaking import Scatter, with_uncertain_velocity
     from rbfrag.fragility.uncertain import GroundMotionQuadrature, UncertainModel, uncertain_model
 
     scatter, rest = Scatter.of(model.term, inputs)
     if scatter is None or model.dependence is None or scatter.names[0] != "pgv_m_s":
         return add_warnings(answer, (NOT_SHARED,))
+    scatter, rest = with_uncertain_velocity(model, scatter, rest)
     block_model, rest = uncertain_model(model, rest)
     about = {
         "possible": getattr(block_model, "possible", None),
@@ -416,7 +435,8 @@ def _shaken_at_sites(
     }
     along, sigma = UncertainModel.over(model, **about).along(rest)
     tau = single("pgv_tau", inputs["pgv_tau"])
-    low, high = shaken_share_range(along, tau, sigma, model.dependence, sites, answer.level)
+    law = model.dependence.shares(_loadings(model, rest))
+    low, high = shaken_share_range(along, tau, sigma, law, sites, answer.level)
     return type(answer)(**(vars(answer) | {"event_low": low, "event_high": high}))
 
 
@@ -474,7 +494,7 @@ def _answer_single(
 ) -> Prediction:
     method, warnings, how = model.method, model.notes, by_model(model.name)
     try:
-        values = model.with_ratios(method.block.completed(inputs, model.term, SINGLE))
+        values = model.with_ratios(model.completed(inputs, SINGLE))
         clear = not model.uncertain and is_clear(model, values)
     except (ArithmeticError, ValueError):  # the checks find the words
         clear = False
@@ -514,8 +534,12 @@ def is_clear(model: FragilityModel, values: Mapping[str, float]) -> bool:
         if not low <= values[name] <= high:
             return False
     block, method = model.method.block, model.method
-    if "pga_g" in values and block.at_rest.holds(values):
-        return False
+    if "pga_g" in values:
+        pga_g = values["pga_g"]
+        if block.at_rest.holds(values):
+            return False
+        if any(values[name] > most_over_pga(name) * pga_g for name in model.term.inputs):
+            return False
     for bound in model.form.bounds:
         if bound.holds(values):
             return False

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from rbfrag.errors import InputError
 from rbfrag.fragility.confidence import Quantiles
-from rbfrag.fragility.measures import ABOUT_SCATTER
+from rbfrag.fragility.measures import ABOUT_SCATTER, most_over_pga
 from rbfrag.fragility.method import ArrayNamespace, arrays
 from rbfrag.fragility.model import AT_REST, Answer, FragilityModel
 from rbfrag.fragility.validation import (
@@ -29,6 +29,7 @@ from rbfrag.results.result import Result, TextLine
 from rbfrag.solver.kinds import BY_MECHANICS, KINDS, mode_of_kind
 from rbfrag.solver.results import FloatArray
 from rbfrag.solver.stability.modes import MODES
+from rbfrag.vocabulary.spectral import spectral_names
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -349,7 +350,7 @@ def _answer_part(
 ) -> NDArray[np.intp]:
     """Fill the predictions of a part; return the indices that need warnings."""
     method, block = model.method, model.method.block
-    values = model.with_ratios(block.completed(inputs, model.term, ns))
+    values = model.with_ratios(model.completed(inputs, ns))
     clear = np.ones(part.stop - part.start, dtype=np.bool_)
     for name, least, most in model.clear_ranges(values):
         clear &= values[name] >= least
@@ -358,6 +359,9 @@ def _answer_part(
     flags = [bound.holds(values) for bound in bounds]
     if method.doubts is not None:
         flags += [holds for holds, _, _ in method.doubts(model.parameters, values, ns)]
+    if "pga_g" in values:
+        spectrum = spectral_names(model.term.inputs)
+        flags += [values[name] > most_over_pga(name) * values["pga_g"] for name in spectrum]
     for holds in flags:
         clear &= np.logical_not(holds)
     if model.spread is not None:

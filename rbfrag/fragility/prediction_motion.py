@@ -10,7 +10,7 @@ from typing import Any, Literal
 from numpy.typing import ArrayLike
 
 from rbfrag.errors import InputError
-from rbfrag.fragility.measures import ABOUT_SCATTER
+from rbfrag.fragility.measures import MEASURES
 from rbfrag.fragility.model import Model
 from rbfrag.fragility.model_selection import find_model, unused_measures
 from rbfrag.fragility.prediction import (
@@ -25,7 +25,8 @@ from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.readers import MotionLike, as_motion
 from rbfrag.motions.toppling_spectrum import toppling_spectrum
 from rbfrag.results.diagnostic import diagnostics
-from rbfrag.vocabulary.quantities import INTENSITY, SPECTRAL
+from rbfrag.vocabulary.quantities import INTENSITY
+from rbfrag.vocabulary.spectral import SPECTRUM_PERIODS_S, spectral_name
 
 Polarity = Literal["forward", "reverse", "both"]
 
@@ -63,8 +64,11 @@ def predict_motion(
     if weights is not None:
         raise InputError(f"weights cannot be combined with a motion: {SIMULATED}")
     motion = as_motion(motion)
-    rejected = {*INTENSITY, *ABOUT_SCATTER, *NOT_OF_A_RECORD} - {*UNRECORDED}
-    extra = [name for name in inputs if name in rejected]
+    extra = [
+        name
+        for name in inputs
+        if (name in MEASURES or name in NOT_OF_A_RECORD) and name not in UNRECORDED
+    ]
     if extra:
         raise InputError(
             f"{' and '.join(extra)} cannot be combined with a motion, which has them: omit them"
@@ -83,23 +87,23 @@ def predict_motion(
     block = {name: single(name, value) for name, value in inputs.items()}
     measures = {name: value for name, value in block.items() if name in UNRECORDED}
     measures |= measures_of(motion)
-    computed = {*SPECTRAL.values(), *(("xp_m_s",) if "p2" in block else ())}
+    ordinates = [spectral_name(period_s) for period_s in SPECTRUM_PERIODS_S]
+    computed = (*ordinates, "xp_m_s") if "p2" in block else ordinates
     chosen = find_model(
         model, (*block, *measures, *computed), db, kind=kind, rotation_deg=rotation_deg
     )
+    if not set(ordinates).isdisjoint(chosen.term.inputs):
+        measures |= zip(ordinates, motion.spectrum_g, strict=True)
     answers: dict[str, Prediction] = {}
     directions: tuple[Literal["forward", "reverse"], ...] = (
         ("forward", "reverse") if polarity == "both" else (polarity,)
     )
     for direction in directions:
         motion_inputs = {**block, **measures}
-        for name in computed.intersection(chosen.term.inputs):
-            if name in SPECTRAL.values():
-                motion_inputs[name] = motion.spectral_accelerations[name]
-            else:
-                # a p2 that cannot be used is rejected by the prediction
-                p2 = block["p2"] if 0.0 < block["p2"] < math.inf else 1.0
-                motion_inputs[name] = float(toppling_spectrum(motion, p2, direction))
+        if "xp_m_s" in chosen.term.inputs:
+            # a p2 that cannot be used is rejected by the prediction
+            p2 = block["p2"] if 0.0 < block["p2"] < math.inf else 1.0
+            motion_inputs["xp_m_s"] = float(toppling_spectrum(motion, p2, direction))
         answer = answer_given(chosen, motion_inputs, level)
         assert isinstance(answer, Prediction)
         answers[direction] = add_warnings(answer, unused_measures(chosen, block))

@@ -6,20 +6,26 @@ amplification, of a component) is added. P is the sum over 41 points, .3 standar
 P has a kink where mechanics forbids failure, for which Gauss-Hermite is worse by far. One variable
 and a certain block are integrated here, without a library: one measure, or several that all move as
 exp(power σ x), x being what they share. All else is in :mod:`rbfrag.fragility.uncertain`.
+
+Spectral ordinates that scatter by themselves are one variable: the spectral velocity of the
+interpolated ordinates, with the moments of :mod:`rbfrag.fragility.velocity_moments`.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from typing import Any, Self
 
 from rbfrag.errors import InputError
+from rbfrag.fragility.completion import UNCERTAIN_VELOCITY
 from rbfrag.fragility.confidence import Quantiles
-from rbfrag.fragility.measures import ABOUT_SCATTER, AMPLIFIED, SCATTERED, Term
-from rbfrag.fragility.method import ArrayNamespace, MechanicalBound
+from rbfrag.fragility.correlation import correlation
+from rbfrag.fragility.measures import ABOUT_SCATTER, AMPLIFIED, SCATTERED, SIGMAS, Term
+from rbfrag.fragility.method import ArrayNamespace, LinearPredictor, MechanicalBound
 from rbfrag.fragility.model import Answer, FragilityModel
+from rbfrag.vocabulary.spectral import period_of
 
 POINTS = tuple(0.3 * i for i in range(-20, 21))
 """The points of a standard normal variable: steps of .3 to 6 on either side."""
@@ -27,25 +33,6 @@ POINTS = tuple(0.3 * i for i in range(-20, 21))
 _DENSITY = [math.exp(-0.5 * x * x) for x in POINTS]
 WEIGHTS = tuple(density / sum(_DENSITY) for density in _DENSITY)
 """Their weights, which sum to 1: P is right to 1e-4 for standard deviations up to 1."""
-
-_ORDER = ("pgv_m_s", "pga_g", "sa03_g", "sa10_g", "sa30_g")
-_CORRELATIONS = (
-    (1.0, 0.6536, 0.6750, 0.7884, 0.7078),
-    (0.6536, 1.0, 0.8496, 0.4852, 0.3076),
-    (0.6750, 0.8496, 1.0, 0.5620, 0.3451),
-    (0.7884, 0.4852, 0.5620, 1.0, 0.6780),
-    (0.7078, 0.3076, 0.3451, 0.6780, 1.0),
-)
-
-
-def correlation(measure: str, other: str) -> float:
-    """Return the correlation of the total log residuals of two intensity measures (RotD50).
-
-    Baker, J. W. & Bradley, B. A. (2017): Intensity measure correlations observed in the NGA-West2
-    database, and dependence of correlations on rupture and site parameters. Earthquake Spectra
-    33(1), 145-156.
-    """
-    return _CORRELATIONS[_ORDER.index(measure)][_ORDER.index(other)]
 
 
 @dataclass(frozen=True)
@@ -102,11 +89,37 @@ class Scatter:
 
     def deviation(self, name: str, inputs: Mapping[str, Any]) -> Any:
         """Return the log standard deviation of one intensity measure alone."""
-        return inputs.get(f"{name.partition('_')[0]}_sigma", 0.0)
+        return inputs.get(SIGMAS.get(name, f"{name}_sigma"), 0.0)
 
     def shared(self, name: str, inputs: Mapping[str, Any]) -> Any:
         """Return the log standard deviation that all intensity measures share."""
-        return 0.0 if self.common is None else AMPLIFIED[name] * inputs[self.common]
+        return 0.0 if self.common is None else AMPLIFIED.get(name, 1) * inputs[self.common]
+
+    def correlation(self, name: str, other: str, inputs: Mapping[str, Any]) -> Any:
+        """Return the correlation of what two intensity measures scatter by each alone."""
+        coefficient = inputs.get(f"{name} {other}", inputs.get(f"{other} {name}"))
+        return correlation(name, other) if coefficient is None else coefficient
+
+
+def with_uncertain_velocity(
+    model: FragilityModel, scatter: Scatter, inputs: Mapping[str, Any]
+) -> tuple[Scatter, dict[str, Any]]:
+    """Return the scatter and the inputs with one spectral velocity in place of uncertain ordinates.
+
+    Args:
+        model: the model that answers, completed for the inputs.
+        scatter: what scatters.
+        inputs: the question, with standard deviations.
+    """
+    ordinates = [name for name in scatter.names if period_of(name) is not None]
+    if not any(SIGMAS[name] in inputs for name in ordinates):
+        return scatter, dict(inputs)
+    from rbfrag.fragility.velocity_moments import correlated_moments
+
+    names = [name for name in scatter.names if name not in ordinates]
+    single = len(names) == 0 or scatter.single
+    moved = replace(scatter, names=(*names, UNCERTAIN_VELOCITY), single=single)
+    return moved, {**inputs, **correlated_moments(model, names, inputs)}
 
 
 @dataclass(frozen=True)
@@ -162,16 +175,16 @@ class ShakenModel(MeanModel):
         totals: list[float] = []
         for x, weight in zip(POINTS, WEIGHTS, strict=True):
             at = {**inputs, **{n: inputs[n] * math.exp(sigma * x) for n, sigma in sigmas.items()}}
-            values = self.method.block.completed(at, self.term, ns)
+            values = self.completed(at, ns)
             if any(bound.holds(values) for bound in FragilityModel.bounds(self, values)):
                 continue
-            unscaled, h = self.form.unscaled(self.parameters, values, ns)
+            unscaled, h = self.linear_predictor(values, ns)
             p = weight * link.probability(unscaled.eta * h, ns)
             middle += p
             outside += p * self.lies_outside(values, ns)
             if quantiles is not None:
                 share = weight * h * link.density(unscaled.eta * h, ns)
-                slopes = [share * slope for slope in unscaled.slopes]
+                slopes = [share * slope for slope in unscaled.all_slopes]
                 totals = [a + b for a, b in zip(totals, slopes, strict=True)] if totals else slopes
         answer = Answer(
             middle, middle, middle, None, None, None, outside / middle if middle else 0.0
@@ -183,6 +196,7 @@ class ShakenModel(MeanModel):
         # d(mean P) by each parameter over F' at the mean: slopes of the eta that has the mean P
         at_mean = link.quantile(middle, ns)
         density = link.density(at_mean, ns)
-        reach = self.errors.half_width([total / density for total in totals], quantiles, ns)
+        mean = LinearPredictor(None, tuple(total / density for total in totals))
+        reach = self.errors.half_width(mean, quantiles, ns)
         low, high = (link.probability(at_mean + end * reach, ns) for end in (-1.0, 1.0))
         return answer._replace(low=low, high=high)

@@ -19,9 +19,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from rbfrag.errors import InputError
 from rbfrag.fragility.confidence import Quantiles
+from rbfrag.fragility.correlation import correlation, nearest_correlation
 from rbfrag.fragility.method import SINGLE, ArrayNamespace, LinearPredictor, arrays
 from rbfrag.fragility.model import Answer, FragilityModel
-from rbfrag.fragility.shaking import POINTS, WEIGHTS, MeanModel, Scatter, correlation
+from rbfrag.fragility.shaking import POINTS, WEIGHTS, MeanModel, Scatter
 from rbfrag.fragility.validation import rejections
 from rbfrag.solver.results import FloatArray
 from rbfrag.solver.scatter import fraction, lognormal
@@ -37,10 +38,11 @@ _PROBED = 2.4
 
 
 def correlations(names: tuple[str, ...]) -> FloatArray:
-    """Return the matrix of :func:`~rbfrag.fragility.shaking.correlation` for these intensity
+    """Return the matrix of :func:`~rbfrag.fragility.correlation.correlation` for these intensity
     measures.
     """
-    return np.array([[correlation(first, other) for other in names] for first in names])
+    matrix = np.array([[correlation(first, other) for other in names] for first in names])
+    return np.asarray(nearest_correlation(matrix))
 
 
 class GroundMotionQuadrature:
@@ -129,8 +131,8 @@ class GroundMotionQuadrature:
         values: dict[str, Any] = dict(inputs)
         for i, name in enumerate(self._scatter.names):
             values[name] = inputs[name] * np.exp(scores @ factors[:, i].T)
-        values = model.method.block.completed(values, model.term, ns)
-        unscaled, h = model.form.unscaled(model.parameters, values, ns)
+        values = model.completed(values, ns)
+        unscaled, h = model.linear_predictor(values, ns)
         eta, forbidden = unscaled.eta * h, np.zeros(1, dtype=np.bool_)
         for bound in model.bounds(values):
             forbidden = forbidden | bound.holds(values)
@@ -162,7 +164,8 @@ class GroundMotionQuadrature:
             for j, other in enumerate(names[: i + 1]):
                 rest = shared[i] * shared[j] - (factor[:, i, :j] * factor[:, j, :j]).sum(axis=1)
                 if individual[i].any() and individual[j].any():
-                    rest = rest + correlation(first, other) * individual[i] * individual[j]
+                    rho = 1.0 if i == j else scatter.correlation(first, other, inputs)
+                    rest = rest + rho * individual[i] * individual[j]
                 if i == j:
                     # what is left of rounding is nothing
                     factor[:, i, i] = np.sqrt(np.where(rest > 1e-12, rest, 0.0))
@@ -414,8 +417,8 @@ class UncertainModel(MeanModel):
                 sums[same] = share.sum(axis=same, keepdims=True)
             return np.asarray(np.nansum(sums[same] * long, axis=axes))
 
-        slopes = [total(slope) * per for slope in unscaled.slopes]
-        reach = self.errors.half_width(slopes, quantiles, ns)
+        slopes = tuple(total(slope) * per for slope in unscaled.all_slopes)
+        reach = self.errors.half_width(LinearPredictor(None, slopes), quantiles, ns)
         low, high = (
             np.where(decided, middle, link.probability(at + end * reach, ns)) for end in (-1.0, 1.0)
         )
@@ -430,14 +433,14 @@ class UncertainModel(MeanModel):
         if self.points is not None:
             measures = self.points.measures(inputs, factors)
             values |= {name: value[None] for name, value in measures.items()}
-        return self.method.block.completed(values, self.term, arrays())
+        return self.completed(values, arrays())
 
     def _certain(
         self, values: Mapping[str, Any], shape: tuple[int, ...]
     ) -> tuple[FloatArray, Any, FloatArray, LinearPredictor, Any]:
         """Return P at each point, where mechanics rules out failure, eta and its parts."""
         ns = arrays()
-        unscaled, h = self.form.unscaled(self.parameters, values, ns)
+        unscaled, h = self.linear_predictor(values, ns)
         eta = np.broadcast_to(unscaled.eta * h, shape)
         forbidden: Any = False
         for bound in FragilityModel.bounds(self, values):

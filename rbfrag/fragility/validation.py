@@ -17,37 +17,41 @@ from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple, NoReturn
 
 from rbfrag.errors import InputError
+from rbfrag.fragility.completion import MOMENTS
 from rbfrag.fragility.confidence import Quantiles
 from rbfrag.fragility.domain import RATIOS
-from rbfrag.fragility.measures import AMPLIFIED, CREDIBLE, HIGHEST, LOWEST
+from rbfrag.fragility.measures import AMPLIFIED, CREDIBLE, HIGHEST, LOWEST, most_over_pga
 from rbfrag.fragility.method import ArrayNamespace, BlockParameters, arrays
 from rbfrag.fragility.model import LEAST, Answer, FragilityModel
 from rbfrag.results.diagnostic import Diagnostic
 from rbfrag.results.numbers import exact_percent
 from rbfrag.solver.kinds import BY_MECHANICS
 from rbfrag.vocabulary.quantities import INPUTS, INTENSITY, NUMBERS, QUANTITIES
+from rbfrag.vocabulary.spectral import spectral_names
 
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
 
+_UNITS = {"velocity_m_s": "m/s"}
+
+
 def _unit(name: str) -> str:
-    unit = QUANTITIES[name].unit if name in QUANTITIES else ""
+    unit = QUANTITIES[name].unit if name in QUANTITIES else _UNITS.get(name, "")
     return "°" if unit == "deg" else unit
 
 
 def _word(name: str) -> str:
     """Return the name of an input, or of a value that is derived the label."""
+    if name == "velocity_m_s":
+        return "spectral velocity at the block's periods"
     return name if name in INPUTS or name not in QUANTITIES else QUANTITIES[name].noun
 
 
 def _prompt(name: str) -> str:
     return QUANTITIES[name].prompt if name in QUANTITIES else f"{name}, a number"
 
-
-_FLOORED = tuple(name for name in AMPLIFIED if name not in ("pgv_m_s", "pgd_m"))
-"""Measures whose logarithms models use; PGV and PGD are intensities, which have a floor too."""
 
 _ABOVE_ZERO = {
     name: "earthquake" if name in INTENSITY else "block"
@@ -181,20 +185,23 @@ def answer_with_findings(
     unstable(
         at_rest, Remark(at_rest, block.strength, strength, f"is not above zero: give {prompt}")
     )
-    floored = dict(inputs)
-    for name in (block.strength, *_FLOORED):
-        if name in floored:
-            floored[name] = ns.maximum(floored[name], LEAST)
-    values = block.completed(floored, term, ns)
+    # models use the logarithms of these
+    floored = {
+        name: ns.maximum(value, LEAST) if name == block.strength or name in AMPLIFIED else value
+        for name, value in inputs.items()
+    }
+    values = model.completed(floored, ns)
     for bound in block.rejects:
         holds = bound.holds(values) & _not(missing) & _not(at_rest)
         reject(holds, Remark(holds, bound.about, values.get(bound.about), bound.text))
         missing = missing | holds
-    intensity = values["intensity_m_s"]
+    intensity = values["intensity_m_s"] * (inputs[term.inputs[0]] != 0.0)
     for name in ("y_m_s", "intensity_m_s", "displacement_m", "pgv_m_s"):
         if name in values:
             values[name] = ns.maximum(values[name], LEAST)
-    above_zero = {name: ns.maximum(value, LEAST) for name, value in values.items()}
+    above_zero = {
+        name: ns.maximum(value, LEAST) for name, value in values.items() if name != MOMENTS
+    }
     model.with_ratios(values, above_zero)
     no_shaking = (inputs[term.inputs[0]] == 0.0) & _not(missing) & _not(at_rest)
     say(no_shaking, Remark(no_shaking, "", 0.0, NO_SHAKING, BY_MECHANICS, "no_shaking"))
@@ -267,11 +274,16 @@ def doubts(
     if model.method.doubts is not None:
         for holds, name, text in model.method.doubts(model.parameters, values, ns):
             yield Remark(holds, name, values[name], text, code="extrapolation")
-    for name, (low, high, text) in CREDIBLE.items():
+    for name in (*CREDIBLE, *spectral_names(values)):
         if name in values:
-            value = values[name]
+            (low, high, text), value = CREDIBLE[name], values[name]
             strange = (value < low) | (value > high)
             yield Remark(strange, name, value, f"is {text}", code="suspicious_value")
+    for name in spectral_names(values) if "pga_g" in values else ():
+        most = most_over_pga(name)
+        text = f"is more than {most:.2g} times PGA, as in no record: check both"
+        strange = values[name] > most * values["pga_g"]
+        yield Remark(strange, name, values[name], text, code="suspicious_value")
 
 
 FROM_SUMS = " and are left out of all sums, which are lower bounds"

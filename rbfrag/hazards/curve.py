@@ -13,18 +13,18 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rbfrag.errors import InputError
-from rbfrag.fragility.measures import ALONE
 from rbfrag.question.shaking import doubts_about
 from rbfrag.results.diagnostic import Diagnostic
 from rbfrag.results.numbers import NEVER, annual_rate, percent
 from rbfrag.results.result import Tabular
 from rbfrag.solver.results import FloatArray
-from rbfrag.vocabulary.quantities import MEASURES, QUANTITIES, SPECTRAL
+from rbfrag.vocabulary.quantities import MEASURES, QUANTITIES
+from rbfrag.vocabulary.spectral import spectral_name
 
 CURVE_MEASURES = ("pga_g", "pgv_m_s", "sa_g")
 """What the levels of a curve may be, with the unit."""
 
-ANSWERED = "PGV, SA(1), PGA"
+ANSWERED = "PGV, SA(T) with T from 0.01 to 10 s, PGA"
 """The measures whose curves are answered, each by a model of that very measure."""
 
 
@@ -96,12 +96,8 @@ class HazardCurve(Tabular):
     @property
     def known_as(self) -> str | None:
         """Name of the measure in `predict`; None where no model uses it as its only measure."""
-        name = self.measure
-        if name == "sa_g":
-            name = next(
-                (measure for period, measure in SPECTRAL.items() if self.is_of(period)), name
-            )
-        return name if name in ALONE else None
+        name = self.measure if self.period_s is None else spectral_name(self.period_s)
+        return name if name in MEASURES else None
 
     def is_of(self, period_s: float) -> bool:
         """Return whether the levels are spectral accelerations of a period [s]."""
@@ -221,7 +217,7 @@ def hazard_curve(
         )
     # a curve may go on to levels that nothing reaches, at rates that say so
     reached = x[rate > _SELDOM]
-    name = SPECTRAL.get(period_s or 0.0, measure) if measure == "sa_g" else measure
+    name = measure if period_s is None else spectral_name(period_s)
     doubts = [*doubts_about({name: reached})]
     if (largest := rate[0]) > _MOST_A_YEAR:
         text = f"the curve has a rate of {largest:.4g} /yr: are these annual rates of exceedance?"
@@ -381,18 +377,12 @@ def openquake_type(imt: str, where: str) -> IntensityType:
     )
 
 
-def requested_measure(imt: str, *, alone: bool = False) -> tuple[str, IntensityType]:
-    """Return the requested measure, by its name in `predict`, and its type.
-
-    Args:
-        alone: accept only what a model reads alone.
-    """
+def requested_measure(imt: str) -> tuple[str, IntensityType]:
+    """Return the requested measure, by its name in `predict`, and its type."""
     kind = openquake_type(imt, "imt")
-    name = kind.measure if kind.period_s is None else SPECTRAL.get(kind.period_s)
-    if name is None or (alone and name not in ALONE):
-        periods = (period for period in SPECTRAL if not alone or SPECTRAL[period] in ALONE)
-        options = ", ".join(["PGV", "PGA", *(f"SA({period:g})" for period in periods)])
-        text = f"imt = {imt}: no model uses it{' alone' if alone else ''}: use one of {options}"
+    name = kind.measure if kind.period_s is None else spectral_name(kind.period_s)
+    if name not in MEASURES:
+        text = f"imt = {imt}: no model uses it: use one of {ANSWERED}"
         raise InputError(text, fields=("imt",))
     return name, kind
 

@@ -13,7 +13,6 @@ import numpy as np
 
 from rbfrag.errors import InputError
 from rbfrag.files import csv_rows, is_number, json_document, number_at, source_text
-from rbfrag.fragility.measures import ALONE
 from rbfrag.hazards.curve import (
     ANSWERED,
     CurveKeywords,
@@ -23,7 +22,7 @@ from rbfrag.hazards.curve import (
     openquake_type,
     rates_from_probabilities,
 )
-from rbfrag.hazards.shaking import velocity_conversion
+from rbfrag.hazards.shaking import by_preference, velocity_conversion
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.question.components import COMPONENTS
 from rbfrag.results.diagnostic import Diagnostic
@@ -155,17 +154,15 @@ def suited_curves(
         chosen = [curve for curve in curves if curve.is_of(converted_period_s)]
         if chosen:
             return chosen
-    else:
-        for name in ALONE:
-            chosen = [curve for curve in curves if curve.known_as == name]
-            if chosen:
-                note = Diagnostic(
-                    f"the file has hazard curves of {', '.join(names)}: that of {chosen[0].imt} is "
-                    "used, the best single predictor of toppling; imt selects another",
-                    "curve_selected",
-                    fields=("imt",),
-                )
-                return [replace(curve, warnings=(*curve.warnings, note)) for curve in chosen]
+    elif measures := by_preference({curve.known_as or "" for curve in curves}):
+        chosen = [curve for curve in curves if curve.known_as == measures[0]]
+        note = Diagnostic(
+            f"the file has hazard curves of {', '.join(names)}: that of {chosen[0].imt} is used, "
+            "the best single predictor of toppling; imt selects another",
+            "curve_selected",
+            fields=("imt",),
+        )
+        return [replace(curve, warnings=(*curve.warnings, note)) for curve in chosen]
     required = ANSWERED if converted_period_s is None else f"SA({converted_period_s:g})"
     raise InputError(f"the file has curves of {', '.join(names)}; wanted is one of {required}")
 
@@ -492,7 +489,7 @@ def _site_rows(
 def _type_from_option(imt: str | None, subject: str) -> IntensityType:
     if imt is None:
         text = f"{subject} in g: the header does not say whether of PGA or SA; state it as imt PGA"
-        raise InputError(f"{text} or SA(1.0)", fields=("imt",))
+        raise InputError(f"{text} or SA(0.5)", fields=("imt",))
     return openquake_type(imt, "imt")
 
 

@@ -219,8 +219,26 @@ def shifts_on(
             for step in (0.0 * axes[0], *(side * axis for axis in axes for side in (1.0, -1.0)))
         ]))  # fmt: skip
         z = ndtri(np.clip(p, _LEAST, _SURE))
-        result[first : first + sizes[number], np.searchsorted(indices, positions)] = z[1:] - z[0]
+        shift = (z[1:] - z[0]) * _of_regression(blocks, grid)
+        result[first : first + sizes[number], np.searchsorted(indices, positions)] = shift
     return result
+
+
+def _of_regression(blocks: KernelBlocks, grid: Grid) -> FloatArray | float:
+    """Return the factor on the standard deviation of Φ⁻¹(P) that stands for the errors of the
+    regression of a spectral velocity, m x nodes: they are taken to move the blocks as b does.
+    """
+    errors, k = blocks.model.errors, len(blocks.model.parameters)
+    if not errors.node_steps:
+        return 1.0
+    nowhere = np.full((blocks.weight.size, blocks.size), -np.inf)
+    slopes = np.stack(table_of(blocks, grid, 0, nowhere).slopes or ())
+    total, part = (
+        np.square(np.tensordot(errors.matrix[:, :stop], slopes[:stop], axes=1)).sum(axis=0)
+        for stop in (errors.size, k)
+    )
+    ratio = np.divide(total, part, out=np.ones_like(total), where=part > 0.0)
+    return np.asarray(np.sqrt(ratio))
 
 
 def _groups(site: Indices, sites: int) -> Iterator[tuple[int, int]]:

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from typing import Any, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rbfrag.errors import InputError
+from rbfrag.errors import InputError, UnknownModelError
 from rbfrag.fragility.confidence import quantiles_of
-from rbfrag.fragility.model_selection import stored_rows
 from rbfrag.fragility.validation import (
     FROM_MEAN,
     FROM_SUMS,
@@ -113,7 +113,7 @@ def hazard(
     - the fields of blocks, with ``kind``, ``block`` and ``back_fracture``, as
       :func:`rbfrag.predict` has them, each a number or of shape (m,); ``kind`` may be one for all
       or one each.
-    - ``imt``: measure of the curve to take of a file that holds several, such as SA(1.0).
+    - ``imt``: measure of the curve to take of a file that holds several, such as SA(0.5).
     - ``site``: its site, by number or name, likewise.
     - ``convert``: name of a published conversion from spectral acceleration to PGV, whose scatter
       is integrated.
@@ -211,14 +211,23 @@ def hazard_at_sites(
     """
     level, first = answering.get("level", LEVEL), [curves[0] for curves in sites]
     checked_years(years)
+    measures = sorted({curve.imt for curves in sites for curve in curves})
+    if len(measures) > 1:
+        raise InputError(
+            f"the curves are of {' and '.join(measures)}: give curves of one measure; imt chooses "
+            "it from files with several",
+            fields=("imt",),
+        )
     reading = HazardLevel.of(first[0], **meaning)
     by_law = reading.magnitudes_from_g is not None
     pga_alone = (PGA_ALONE,) if reading.name == "pga_g" else ()
     if pga_alone and answering.get("model") is None:
-        named = [row.name for row in stored_rows(answering.get("db")) if row.term == "pga"]
+        named: list[str] = []
+        with suppress(InputError, UnknownModelError):
+            named = [part.model.name for part in parts_by_model(inputs, reading, answering)[0]]
         by_model = f", or accept the bias with model {named[0]}" if named else ""
         raise InputError(
-            f"{first[0].source}: {pga_alone[0].partition(':')[0]}; give a curve of PGV or SA(1.0), "
+            f"{first[0].source}: {pga_alone[0].partition(':')[0]}; give a curve of PGV or SA, "
             f"or the disaggregation by magnitude{by_model}",
             fields=("model", "disaggregation"),
         )

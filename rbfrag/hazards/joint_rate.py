@@ -473,11 +473,11 @@ def _of_site(
     model, blocks = site_blocks[0][0].model, [group for group, _ in site_blocks]
     # The interval is that of the direction in parameter space along which the sum of the rates
     # changes most: one step down and one up, applied to all blocks together.
-    steps: list[FloatArray | float] = [0.0]
+    steps: list[FloatArray | None] = [None]
     law = model.dependence if has_dependence else None
     if law is not None:
         step = error_step(model, np.sum([gradient for _, gradient in site_blocks], axis=0), level)
-        steps = [0.0, -step, step]
+        steps = [None, -step, step]
     tables = np.stack(
         [
             np.concatenate([probabilities(group, mass.grid, step) for group in blocks])
@@ -490,12 +490,11 @@ def _of_site(
     parts, ends, where = [], None, None
     if law is not None:
         # the placement of the blocks, with unknown azimuths, by their medians
-        block = model.method.block
         medians = {
             name: np.concatenate([group.numbers[name][group.weight.size // 2] for group in blocks])
-            for name in block.names
+            for name in model.method.block.names
         }
-        where = Placement.of_numbers(block, medians, polarity=UNKNOWN)
+        where = Placement.of_blocks(model, medians, polarity=UNKNOWN)
         assert where is not None
         rate = joint_rates(tables, site_mass, where, law).rate[0]
         ends = float(rate[1:].min()), float(rate[1:].max())

@@ -32,7 +32,7 @@ from rbfrag.hazards.map_probability import SiteProbability, SiteShaking
 from rbfrag.results.diagnostic import Diagnostic
 from rbfrag.results.numbers import exact_percent
 from rbfrag.solver.results import FloatArray
-from rbfrag.vocabulary.quantities import SPECTRAL
+from rbfrag.vocabulary.spectral import period_of
 
 Indices = NDArray[np.intp]
 
@@ -47,11 +47,7 @@ _NUGGET = 1e-9
 _SOLVED_AT_ONCE = 2**21
 """Numbers of the matrices that are solved at once."""
 
-_PERIODS_S = {
-    "pgv_m_s": 1.0,
-    "pga_g": 0.0,
-    **{name: period for period, name in SPECTRAL.items()},
-}
+_PERIODS_S = {"pgv_m_s": 1.0, "pga_g": 0.0}
 """Period whose range is that of a measure [s]; of PGV by usage, for PGV goes with SA(1 s)."""
 
 
@@ -68,7 +64,8 @@ def correlation_range_km(measure: str) -> float:
     Args:
         measure: name in :func:`rbfrag.predict`, such as ``pgv_m_s``.
     """
-    period = _PERIODS_S[measure]
+    period = period_of(measure)
+    period = _PERIODS_S[measure] if period is None else period
     return 22.0 + 3.7 * period if period >= 1.0 else 8.5 + 17.2 * period
 
 
@@ -342,9 +339,7 @@ def map_failures(
         answer.shaking.model,
         {n: values[blocks] for n, values in columns.items()},
     )
-    where = Placement.of_numbers(
-        model.method.block, block_numbers, site=group[site], polarity=UNKNOWN
-    )
+    where = Placement.of_blocks(model, block_numbers, site=group[site], polarity=UNKNOWN)
     laws = normals_by_law(model.dependence, where, site.size)
     generator = np.random.default_rng(seed)
     drawn = {name: np.zeros(draws) for name in laws}

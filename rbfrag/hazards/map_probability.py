@@ -10,11 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbfrag.fragility.confidence import quantiles_of
-from rbfrag.fragility.measures import SCATTERED
+from rbfrag.fragility.measures import SIGMAS
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.fragility.prediction import array_answer
 from rbfrag.fragility.prediction_array import predict_many
-from rbfrag.fragility.shaking import Scatter
+from rbfrag.fragility.shaking import Scatter, with_uncertain_velocity
 from rbfrag.fragility.uncertain import GroundMotionQuadrature, UncertainModel
 from rbfrag.question.components import Component
 from rbfrag.question.fields import AnsweringFields, BlockKeywords, V
@@ -73,9 +73,8 @@ class SiteShaking:
         return {
             **{name: self.median[site, i] for i, name in enumerate(self.names)},
             **{
-                sigma: self.deviations[site, self.names.index(name)]
-                for sigma, name in SCATTERED.items()
-                if name in self.integrated
+                SIGMAS[name]: self.deviations[site, self.names.index(name)]
+                for name in self.integrated
             },
             **({"amplification_sigma": np.array([self.scatter])} if self.scatter else {}),
         }
@@ -152,7 +151,7 @@ def site_probability(
 
     Args:
         measures: what is known of the shaking at the sites, by the names of
-            :func:`rbfrag.predict` (pgv_m_s [m/s], pga_g and sa10_g [g], …), each of shape (n,).
+            :func:`rbfrag.predict` (pgv_m_s [m/s], pga_g and sa(1) [g], …), each of shape (n,).
         numbers: p2 [1/s²] and kr of the blocks, shape (m,), or (n,) with `own_block`, if they are
             not given by name.
         weight: weights of the blocks of a class, shape (m,); None for equal ones.
@@ -174,14 +173,24 @@ def site_probability(
     weights = np.full(size, 1.0) if weight is None else weight
     weights = np.ones(n) if own_block else weights / weights.sum()
     blocks = 1 if own_block else size
-    scatter, _ = Scatter.of(chosen.term, shaking.inputs_at(np.arange(n)))
+    of_measures, _ = Scatter.of(chosen.term, shaking.inputs_at(np.arange(n)))
 
-    def pairs_of(site: Indices, block: Indices) -> dict[str, FloatArray]:
-        """Return block parameters and shaking for pairs of site and block."""
-        return {
+    def scattered(site: Indices, block: Indices) -> tuple[Scatter | None, dict[str, FloatArray]]:
+        pairs = {
             **{name: values[block] for name, values in columns.items()},
             **shaking.inputs_at(site),
         }
+        return (
+            (None, pairs)
+            if of_measures is None
+            else with_uncertain_velocity(chosen, of_measures, pairs)
+        )
+
+    def pairs_of(site: Indices, block: Indices) -> dict[str, FloatArray]:
+        """Return block parameters and shaking for pairs of site and block."""
+        return scattered(site, block)[1]
+
+    scatter, _ = scattered(np.zeros(1, dtype=np.intp), np.zeros(1, dtype=np.intp))
 
     # P = E[P(block | im)] over ln im ~ N(median, σ). Most pairs are clear: where even the median
     # fails with certainty or a strong deviation with no probability, fewer points suffice.

@@ -185,8 +185,8 @@ class Portfolio:
     def placement(self, indices: NDArray[np.intp]) -> Placement:
         """Return the placement of selected blocks in one earthquake, with unknown azimuths."""
         numbers = {name: values[indices] for name, values in self.numbers.items()}
-        block, site = self.answering[0].method.block, self.site[indices]
-        placement = Placement.of_numbers(block, numbers, site=site, polarity=UNKNOWN)
+        model, site = self.answering[0], self.site[indices]
+        placement = Placement.of_blocks(model, numbers, site=site, polarity=UNKNOWN)
         assert placement is not None
         return placement
 
@@ -203,7 +203,7 @@ class Portfolio:
     @cached_property
     def answering(self) -> tuple[FragilityModel, ...]:
         """The models with their formulas."""
-        return tuple(FragilityModel.from_row(row) for row in self.models)
+        return tuple(FragilityModel.from_row(row).for_inputs(self.measures) for row in self.models)
 
     def numbers_of(self, model: FragilityModel, indices: NDArray[np.intp]) -> dict[str, FloatArray]:
         """Return the model inputs of selected blocks, with standard deviations, shape (m,)."""

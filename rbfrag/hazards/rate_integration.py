@@ -10,8 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbfrag.db.model_file import ModelRow
+from rbfrag.fragility.completion import MOMENTS
 from rbfrag.fragility.confidence import ParameterErrors, quantiles_of
-from rbfrag.fragility.method import arrays
+from rbfrag.fragility.method import LinearPredictor, arrays
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.fragility.uncertain import normal_product, scatter_steps
 from rbfrag.fragility.validation import outside_domain
@@ -114,19 +115,17 @@ class KernelBlocks:
         numbers = {name: values[:, chosen] for name, values in self.numbers.items()}
         return KernelBlocks(self.model, self.median, numbers, self.weight, self.site[chosen])
 
-    def moved(self, step: FloatArray | float) -> KernelBlocks:
+    def moved(self, step: FloatArray) -> KernelBlocks:
         """Return the blocks with a step added to the parameters of their model."""
-        parameters = tuple(np.add(self.model.parameters, step).tolist())
-        return replace(self, model=replace(self.model, parameters=parameters))
+        return replace(self, model=self.model.moved(step.tolist()))
 
     def values(self, u: FloatArray) -> dict[str, Any]:
         """Return the inputs of the model at u, of a shape that broadcasts with draws x blocks."""
-        block, term = self.model.method.block, self.model.term
         inputs: dict[str, Any] = {
             name: numbers[..., None] for name, numbers in self.numbers.items()
         }
-        inputs[term.inputs[0]] = self.median * np.exp(u)
-        return block.completed(inputs, term, arrays())
+        inputs[self.model.term.inputs[0]] = self.median * np.exp(u)
+        return self.model.completed(inputs, arrays())
 
     def forbidden(self, values: Mapping[str, Any]) -> NDArray[np.bool_]:
         """Return where failure is impossible by mechanics."""
@@ -201,7 +200,7 @@ def _evaluated(
     blocks: KernelBlocks, u: FloatArray, *, slopes: bool
 ) -> tuple[FloatArray, list[FloatArray], dict[str, Any]]:
     model, ns, values = blocks.model, arrays(), blocks.values(u)
-    unscaled, h = model.form.unscaled(model.parameters, values, ns)
+    unscaled, h = model.linear_predictor(values, ns)
     eta, link = unscaled.eta * h, model.method.link
     forbidden = blocks.forbidden(values)
     p = np.where(forbidden, 0.0, link.probability(eta, ns))
@@ -209,7 +208,11 @@ def _evaluated(
         return p, [], values
     density = np.where(forbidden, 0.0, link.density(eta, ns) * h)
     # far below its bound a density is 0, and a slope there may be infinite
-    return p, [np.where(density > 0.0, density * slope, 0.0) for slope in unscaled.slopes], values
+    return (
+        p,
+        [np.where(density > 0.0, density * slope, 0.0) for slope in unscaled.all_slopes],
+        values,
+    )
 
 
 def _smooth_jumps(
@@ -230,6 +233,7 @@ def _outside(blocks: KernelBlocks, values: Mapping[str, Any], size: int) -> Floa
     thin = {
         name: value[..., nodes] if np.shape(value)[-1:] == (size,) and size > 1 else value
         for name, value in values.items()
+        if name != MOMENTS
     }
     model = blocks.model
     model.with_ratios(thin)
@@ -270,6 +274,7 @@ class RatePart(NamedTuple):
     Args:
         number: place of the part in the order of all.
         row: the model as stored.
+        measures: what it reads of the shaking.
         blocks: the other attributes of `KernelBlocks`, by name.
         mass: of these sites alone.
         level: confidence level of the interval.
@@ -277,6 +282,7 @@ class RatePart(NamedTuple):
 
     number: int
     row: ModelRow
+    measures: tuple[str, ...]
     blocks: Mapping[str, Any]
     mass: SiteMass
     level: float
@@ -289,7 +295,8 @@ any order."""
 
 def rate_part(part: RatePart) -> tuple[int, Rates]:
     """Return number and rates of one part; a module-level function, for worker processes."""
-    blocks = KernelBlocks(FragilityModel.from_row(part.row), **part.blocks)
+    model = FragilityModel.from_row(part.row).for_inputs(part.measures)
+    blocks = KernelBlocks(model, **part.blocks)
     return part.number, rates(blocks, part.mass, part.level)
 
 
@@ -305,7 +312,7 @@ def rates(blocks: KernelBlocks, mass: SiteMass, level: float, run: Run | None = 
     if run is not None:
         return _in_parts(blocks, mass, level, run)
     allowed = blocks.allowed_from(mass.grid)
-    k, b = len(blocks.model.parameters), mass.branches.shape[0]
+    k, b = blocks.model.errors.size, mass.branches.shape[0]
     rows = np.zeros((6 + k + b, blocks.size))
     for indices, first in chunks(blocks, mass.grid, allowed):
         group = blocks.only(indices)
@@ -332,7 +339,8 @@ def _in_parts(blocks: KernelBlocks, mass: SiteMass, level: float, run: Run) -> R
                 "site": group.site - low,
             }  # fmt: skip
             site_mass = of_sites(mass, slice(low, high))
-            yield RatePart(number, group.model.row, columns, site_mass, level)
+            model = group.model
+            yield RatePart(number, model.row, model.term.inputs, columns, site_mass, level)
 
     results = sorted(run(work_parts(), len(parts)))
     joined = (
@@ -344,7 +352,8 @@ def _in_parts(blocks: KernelBlocks, mass: SiteMass, level: float, run: Run) -> R
 
 def half_width(errors: ParameterErrors, gradient: FloatArray, level: float) -> FloatArray:
     """Return the half-width of a confidence interval by the delta method, shape (m,)."""
-    return np.asarray(errors.half_width(list(gradient), quantiles_of(level), arrays()))
+    slopes = LinearPredictor(None, tuple(gradient))
+    return np.asarray(errors.half_width(slopes, quantiles_of(level), arrays()))
 
 
 def interval_end(rate: FloatArray, half: FloatArray | float, side: float) -> FloatArray:
@@ -367,20 +376,20 @@ def error_step(model: FragilityModel, gradient: FloatArray, level: float) -> Flo
     Args:
         gradient: derivatives g of the number by the parameters, shape (k,).
     """
-    along = np.array(model.row.covariance) @ gradient
+    along = model.errors.covariance_times(gradient)
     variance = float(gradient @ along)
     if not variance > 0.0:
         return np.zeros(gradient.size)
     return np.asarray(along * (half_width(model.errors, gradient[:, None], level)[0] / variance))
 
 
-def probabilities(blocks: KernelBlocks, grid: Grid, step: FloatArray | float = 0.0) -> FloatArray:
+def probabilities(blocks: KernelBlocks, grid: Grid, step: FloatArray | None = None) -> FloatArray:
     """Return P of the blocks at all nodes of a grid, made non-decreasing, m x nodes.
 
     Args:
-        step: what is added to the model's parameters.
+        step: what is added to the model's parameters; None for nothing.
     """
-    moved = blocks.moved(step)
+    moved = blocks if step is None else blocks.moved(step)
     p = table_of(moved, grid, 0, moved.allowed_from(grid), slopes=False).probability
     return np.maximum.accumulate(p, axis=1)
 

@@ -1,13 +1,13 @@
 """Levels of a hazard curve as a model uses them: measure, factor, dispersion, and blocks by model.
 
 A model of PGA averages over the PGV that goes with a PGA in the reference, whose earthquakes are
-stronger than those that most often make such a PGA. PGV and SA(1.0) need no magnitude.
+stronger than those that most often make such a PGA. PGV and SA need no magnitude.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple, Unpack
 
@@ -25,15 +25,13 @@ from rbfrag.question.keywords import model_for
 from rbfrag.question.predict_arrays import block_reasons_of, blocks_of_arrays
 from rbfrag.results.diagnostic import Diagnostic
 from rbfrag.solver.results import FloatArray
+from rbfrag.vocabulary.spectral import SpectralMapping, period_of, spectral_names
 
-TAU = {"pgv_m_s": 0.15, "sa10_g": 0.15}
+TAU = SpectralMapping({"pgv_m_s": 0.15}, lambda _: 0.15, "sa_g")
 """Standard deviation of ln rate between the measures that may be asked for."""
 
 LAW_TAU = 0.25
 """The same where PGV is taken from PGA and magnitude."""
-
-PREFERRED = ("pgv_m_s", "sa10_g")
-"""The measures that answer by themselves, the better first."""
 
 PGA_ALONE = Diagnostic(
     "a rate from PGA alone is biased: the model averages over the PGV of the strong earthquakes "
@@ -42,6 +40,15 @@ PGA_ALONE = Diagnostic(
 )
 
 _CONSTANT, _SLOPE, _BY_MAGNITUDE, _SCATTER, _SATURATION = -0.623, 0.873, 0.472, 0.434, 7.6
+
+
+def by_preference(names: Collection[str]) -> list[str]:
+    """Return the measures whose rates are known, the best predictor of toppling first: PGV, SA by
+    the distance of its period from 1 s, PGA.
+    """
+    spectral = spectral_names(names)
+    spectral.sort(key=lambda name: abs(math.log(period_of(name) or 1.0)))
+    return [name for name in ("pgv_m_s", *spectral, "pga_g") if name in names]
 
 
 def velocity_of(pga_g: FloatArray, magnitude: FloatArray) -> FloatArray:
@@ -229,12 +236,9 @@ def _measure(
             both = ("convert_sigma", "convert")
             raise InputError("convert_sigma requires convert: omit it", fields=both)
         if curve.known_as is None:
-            also = [item.name for item in CONVERSIONS.values() if curve.is_of(item.period_s)]
-            converted = f", or turn it into PGV with convert {' or '.join(also)}" if also else ""
             raise InputError(
-                f"{curve.source}: no model uses {curve.imt} alone: give a curve of one of "
-                f"{ANSWERED}{converted}",
-                fields=("convert",),
+                f"{curve.source}: no model uses {curve.imt}: give a curve of one of {ANSWERED}",
+                fields=("imt",),
             )
         return curve.known_as, 1.0, 0.0
     if curve.measure != "sa_g":

@@ -378,7 +378,7 @@ class ModelBlocks:
 
     def placement(self) -> Placement | None:
         """Return the placement of the blocks, with unknown azimuths; None without a size."""
-        return Placement.of_numbers(self.model.method.block, self.medians, polarity=UNKNOWN)
+        return Placement.of_blocks(self.model, self.medians, polarity=UNKNOWN)
 
     def rate(self, curve: HazardCurve) -> AnyRate:
         """Return the annual rate of any failure under a curve."""
@@ -414,7 +414,7 @@ class ModelBlocks:
         k, m, site_mass = self.weight.size, self.count, mass.mass[0]
         gradient = draw_rates.gradient @ np.repeat(self.weight, m)
         step = error_step(self.model, gradient, self.level)
-        moved = [probabilities(blocks, mass.grid, part) for part in (0.0, -step, step)]
+        moved = [probabilities(blocks, mass.grid, part) for part in (None, -step, step)]
         p = np.stack([part.reshape(k, m, -1) for part in moved], axis=1)
         laws = [_by_law(table) @ site_mass for table in p.reshape(k * 3, m, -1)]
         by_law = np.stack(laws, axis=1).reshape(-1, k, 3)

@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike
 from rbfrag.errors import InputError
 from rbfrag.motions import intensity, response_spectrum
 from rbfrag.motions.polarity import FloatArray
+from rbfrag.vocabulary.spectral import SPECTRUM_PERIODS_S
 
 LONGEST_S = 1e100
 """Beyond this nothing can be integrated."""
@@ -206,7 +207,7 @@ class GroundMotion:
     @property
     def spectrum_g(self) -> tuple[float, ...]:
         """Response spectrum at 5 % damping [g], at the periods `SPECTRUM_PERIODS_S`."""
-        return self._spectrum(response_spectrum.SPECTRUM_PERIODS_S)
+        return self._spectrum(SPECTRUM_PERIODS_S)
 
     @cached_property
     def housner_m(self) -> float:

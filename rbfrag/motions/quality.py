@@ -12,11 +12,12 @@ import numpy as np
 
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.intensity import TM_BAND_HZ
-from rbfrag.motions.response_spectrum import SPECTRUM_PERIODS_S, DirectionalPeaks
+from rbfrag.motions.response_spectrum import DirectionalPeaks
 from rbfrag.results.diagnostic import Diagnostic, with_prefix
 from rbfrag.results.numbers import exact_percent, rounded
 from rbfrag.results.result import Result, TextLine, TextTable
 from rbfrag.vocabulary.quantities import QUANTITIES
+from rbfrag.vocabulary.spectral import SPECTRUM_PERIODS_S
 
 LONGEST_DT_S = 0.1
 """Strong-motion instruments sample at 0.001 to 0.02 s; above 0.1 s the dt is likely wrong."""
@@ -255,7 +256,6 @@ class MotionSummary(Result):
             "start_time": None if motion.start_time is None else motion.start_time.isoformat(),
             **{name: getattr(motion, name) for name in ("dt_s", "npts", "duration_s")},
             **asdict(motion.measures),
-            **motion.spectral_accelerations,
             "housner_m": motion.housner_m,
             "sa_g": _by_period(motion.spectrum_g),
             **{

@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 from rbfrag.motions.polarity import FloatArray
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.vocabulary.quantities import MEASURES
+from rbfrag.vocabulary.spectral import SPECTRUM_PERIODS_S
 
 ComplexArray = NDArray[np.complex128]
 Samples = FloatArray | ComplexArray
@@ -36,12 +37,6 @@ _STORED = {
 }
 PERIODS_S: Mapping[str, float] = {_STORED[period_s]: period_s for period_s in sorted(_STORED)}
 """Period [s] of each spectral acceleration that is a measure of its own, by its name."""
-
-SPECTRUM_PERIODS_S = (
-    0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 0.6, 0.75, 1.0, 1.25, 1.5, 1.75, 2.0, 2.5, 3.0, 3.5, 4.0, 5.0,
-    6.0, 7.5, 10.0,
-)  # fmt: skip
-"""Periods [s] of the response spectrum that is stored with each motion."""
 
 HOUSNER_PERIODS_S = tuple(n / 20.0 for n in range(2, 51))
 """Periods [s] of the Housner intensity, 0.1 to 2.5 s in steps of 0.05 s."""

@@ -10,13 +10,14 @@ import numpy as np
 
 from rbfrag.errors import InputError
 from rbfrag.fragility import describe
-from rbfrag.fragility.measures import TERMS
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.fragility.prediction import array_answer
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.plots import canvas
 from rbfrag.plots.canvas import as_written
-from rbfrag.plots.model_lines import MORE_TERMS, HeldMeasures, failure_line, held_measures
+from rbfrag.plots.curve import AXIS
+from rbfrag.plots.equation import equation_lines
+from rbfrag.plots.model_lines import HeldMeasures, failure_line, held_measures
 from rbfrag.results.numbers import exact_percent
 from rbfrag.vocabulary.quantities import QUANTITIES
 
@@ -47,7 +48,8 @@ _KR_AXIS_OFF_PT = 52.0
 _USUAL_WIDTH_PT = 350.0
 """Of axes whose lines are as thick as usual; on narrower ones they would run together [points]."""
 
-_DEFAULT_RANGE = (0.01, 2.0)
+_DEFAULT_RANGE, _WIDEST = (0.01, 2.0), (1e-3, 10.0)
+"""Range of the abscissa [m/s or g] where none is fitted, and where the fitted one is looked for."""
 
 
 @canvas.in_own_style
@@ -56,18 +58,18 @@ def plot_chart(
 ) -> canvas.Picture:
     """Draw lines of equal probability of toppling over intensity and block.
 
-    The ordinate is the block's toppling velocity k_r g/p, and of blocks of a given size k_r. What
-    the model uses in addition and the intensity is held: the size of the block, and PGA and Tm of a
-    model of PGV with PGA, which is drawn over PGV; the caption says at what. The sheet reaches
-    little beyond the ranges that were fitted, and is shaded there.
+    The ordinate is the block's toppling velocity k_r g/p, and of blocks of a given size k_r.
+    Further predictors are held constant, as the caption says: the size of the block, T_m, and PGA
+    of a model of PGV with PGA, which is drawn over PGV. The sheet reaches little beyond the ranges
+    that were fitted, and is shaded there. The equation of the model stands below.
 
     Args:
-        model: a model of one number, pgv_pga or pgv_pga_tm.
+        model: a model with a chart (:func:`rbfrag.plots.model_lines.chart_axis`).
         held: what is held; None for the middle of the fitted ranges.
     """
     canvas.plot_path(path)
     held = held_measures(model) if held is None else held
-    figure = canvas.new_figure(7.4, 6.6)
+    figure = canvas.new_figure(7.4, 7.4)
     axes = figure.add_subplot()
     draw_chart(axes, model, held)
     fitted = describe.fitted_data(model.row.diagnostics)
@@ -77,6 +79,7 @@ def plot_chart(
         f"{fitted + '; ' if fitted else ''}shaded: outside the fitted range",
         fontsize=10,
     )
+    figure.supxlabel("\n".join(equation_lines(model, held.p2)), fontsize=8)
     return canvas.save_figure(figure, path)
 
 
@@ -91,7 +94,7 @@ def draw_chart(
 
     Args:
         axes: empty axes.
-        point: intensity and toppling velocity of a block to show [m/s], or measure in its unit.
+        point: abscissa and toppling velocity [m/s] of a block to show.
     """
     from matplotlib.ticker import NullLocator
 
@@ -128,7 +131,8 @@ def draw_chart(
         if up is not None:
             axes.axhspan(bottom, max(up[0], bottom), **shade)
             axes.axhspan(min(up[1], top), top, **shade)
-    axes.set_xlabel(TERMS["pgv"].label if model.term.name in MORE_TERMS else model.term.label)
+    of_term = held.across == "intensity_m_s"
+    axes.set_xlabel(model.term.label if of_term else AXIS[held.across])
     axes.set_ylabel("toppling velocity of the block, $y = k_r\\,g/p$ [m/s]")
     axes.grid(visible=True, which="major", lw=0.6, color="#9a9a9a")
     axes.grid(visible=True, which="minor", lw=0.3, color="#c8c8c8")
@@ -154,9 +158,9 @@ def draw_chart(
 def _known_ranges(
     model: FragilityModel, held: HeldMeasures
 ) -> tuple[tuple[float, float], tuple[float, float] | None]:
-    """Return the fitted ranges of the intensity and of y, for the held variables."""
+    """Return the fitted ranges of the abscissa and of y, for the held variables."""
     domain = model.row.domain
-    fitted_x = domain.get("intensity_m_s") or domain.get(model.term.inputs[0]) or _DEFAULT_RANGE
+    fitted_x = domain.get(held.across) or (_WIDEST if held.words else _DEFAULT_RANGE)
     low, high = (max(float(edge), 1e-4) for edge in fitted_x)
     fitted_y = domain.get("y_m_s")
     up = None if fitted_y is None else (float(fitted_y[0]), float(fitted_y[1]))
@@ -167,7 +171,7 @@ def _known_ranges(
     y = np.array([failure_line(model, x, p, held) for p in CONTOURS])
     inside = _is_fitted(model, held, np.broadcast_to(x, y.shape), y)
     if not inside.any():
-        return (low, high), up
+        return _DEFAULT_RANGE, up
     x = x[inside.any(axis=0)]
     return (float(x[0]), float(x[-1])), (float(y[inside].min()), float(y[inside].max()))
 
@@ -221,10 +225,6 @@ def _is_fitted(
     return fitted
 
 
-_PERIODS_S = {"sa03_g": ("sa03_over_pga", 0.0), "sa10_g": ("v10_over_pgv", 1.0),
-              "sa30_g": ("v30_over_pgv", 3.0)}  # fmt: skip
-
-
 @canvas.in_own_style
 def plot_kind_chart(
     model: FragilityModel, path: canvas.Out, options: Mapping[str, float]
@@ -246,7 +246,8 @@ def plot_kind_chart(
     canvas.plot_path(path)
     names, domain = model.method.block.names, model.row.domain
     strength = next(name for name in names if name.startswith("k"))
-    first, *other_names = model.term.inputs
+    first = "pgv_m_s" if "pgv_m_s" in model.term.inputs else model.term.inputs[0]
+    other_names = [name for name in model.term.inputs if name != first]
     held = {name: math.sqrt(math.prod(domain[name])) for name in names if name != strength}
     held |= {"beta_deg": 0.0} if "beta_deg" in model.method.block.options else {}
     if "magnitude" in other_names:
@@ -269,7 +270,7 @@ def plot_kind_chart(
     ratios = []
     for name in other_names:
         if name not in inputs:
-            inputs[name], words = _in_proportion(name, first, xs, model)
+            inputs[name], words = _in_proportion(name, xs, model)
             ratios.append(words)
     answers = array_answer(
         model, {name: np.broadcast_to(v, xs.shape) for name, v in inputs.items()}
@@ -307,32 +308,18 @@ def _label_points(x: np.ndarray, y: np.ndarray, p: np.ndarray) -> Iterator[tuple
             yield float(x[column[row]]), float(y[row])
 
 
-def _in_proportion(
-    name: str, first: str, x: np.ndarray, model: FragilityModel
-) -> tuple[np.ndarray, str]:
-    """Return a measure at the middle fitted ratio to the first one, and the ratio as text."""
+def _in_proportion(name: str, pgv: np.ndarray, model: FragilityModel) -> tuple[np.ndarray, str]:
+    """Return a measure at the middle fitted ratio to PGV [m/s], and the ratio as text."""
     domain, g = model.row.domain, STANDARD_GRAVITY_M_S2
-
-    def middle(ratio: str) -> float:
-        return math.sqrt(math.prod(domain[ratio]))
-
-    seconds = middle("pgv_over_pga_s")
-    pgv = x if first == "pgv_m_s" else x * seconds * g if first == "pga_g" else None
-    if first == "sa10_g":
-        pgv = x * g / (2.0 * math.pi * middle("v10_over_pgv"))
-    if pgv is not None and name == "pga_g":
+    if name == "pga_g":
+        seconds = math.sqrt(math.prod(domain["pgv_over_pga_s"]))
         return pgv / (seconds * g), f"PGV/(PGA g) = {seconds:.3g} s"
-    if pgv is not None and name in _PERIODS_S:
-        ratio, period_s = _PERIODS_S[name]
-        of = middle(ratio)
-        sa = of * pgv * 2.0 * math.pi / (period_s * g) if period_s else of * pgv / (seconds * g)
-        return sa, f"{ratio.replace('_over_', '/')} = {of:.3g}"
-    if pgv is not None and name == "arias_m_s" and name in domain:
+    if name == "arias_m_s" and name in domain:
         # twice the acceleration is four times the intensity
-        of = middle(name) / math.prod(domain["pgv_m_s"])
+        of = math.sqrt(math.prod(domain[name])) / math.prod(domain["pgv_m_s"])
         return of * pgv**2, f"Arias/PGV² = {of:.3g} s/m"
     raise InputError(
         f"model {model.name!r} uses {' and '.join(model.term.inputs)}, and {name} is not "
-        f"proportional to {first}: give it, or choose another model",
+        "proportional to PGV: give it, or choose another model",
         fields=(name,),
     )

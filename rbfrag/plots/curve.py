@@ -6,12 +6,13 @@ import math
 import re
 from collections.abc import Callable, Mapping
 from textwrap import wrap
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from rbfrag.errors import InputError
 from rbfrag.fragility import describe
+from rbfrag.fragility.measures import AMPLIFIED
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.fragility.prediction import array_answer
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
@@ -22,16 +23,20 @@ from rbfrag.results.numbers import exact_percent
 from rbfrag.solver.kinds import mode_of_kind
 from rbfrag.solver.results import FloatArray
 from rbfrag.vocabulary.quantities import MEASURES, QUANTITIES
+from rbfrag.vocabulary.spectral import SpectralMapping
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 
-AXIS = {
-    name: f"{measure.axis} [{QUANTITIES[name].unit}]"
-    for name, measure in MEASURES.items()
-    if measure.axis
-}
+AXIS = SpectralMapping(
+    {
+        name: f"{measure.axis} [{QUANTITIES[name].unit}]"
+        for name, measure in MEASURES.items()
+        if measure.axis
+    },
+    lambda name: f"{MEASURES[name].axis} [{QUANTITIES[name].unit}]", "sa_g",
+)  # fmt: skip
 """What a curve may run over."""
 
 EVENT = "#b8b8b8"
@@ -106,21 +111,12 @@ def plot_curve(
     y_m_s = _velocity_m_s(model, block)
     about_block = _SUBSCRIPT.sub(r"$\1_\2$", describe.labelled_values(block, 3))
     about_block += "" if y_m_s is None else f", $y$ = {y_m_s:.3g} m/s"
-    conditions = []
-    for name in fixed_names:
-        symbol, period_s = QUANTITIES[name].symbol, MEASURES[name].period_s
-        if period_s is not None:
-            symbol = f"SA({period_s:.1f} s)"
-        elif "_" in symbol or len(symbol) == 1:
-            symbol = f"${symbol}$"
-        conditions.append(f"{symbol} = {held[name]:g} {QUANTITIES[name].unit}".rstrip())
-    about_block += f"; {', '.join(conditions)}" if conditions else ""
+    about_block += f"; {describe.shaking({}, held)}" if held else ""
     fitted = describe.fitted_data(model.row.diagnostics)
-    model_name = f"model {describe.stored_model(model.row)}"
     axes.set_title(
         "\n".join(wrap(f"block {about_block}", 85))
         + "\n"
-        + as_written(", ".join(filter(None, (model_name, fitted))), 85),
+        + as_written(", ".join(filter(None, (f"model {model.name}", fitted))), 85),
         fontsize=10,
     )
     canvas.legend_below(figure, 2)
@@ -142,13 +138,20 @@ def draw_curve(
     """Draw the curve of :func:`plot_curve` into axes.
 
     Args:
-        at: a value of the measure to point out; 0 for none.
+        at: a value of the measure to point out, to which the held measures belong: those that grow
+            with the amplitude of the shaking are in proportion to it; 0 for none.
         sites: number of sites of one earthquake; None for no band.
     """
-    end = max(_right_end(model, block, varied, held), 1.15 * at)
+    scaled = [name for name in held if at > 0.0 and name in AMPLIFIED]
+
+    def inputs_at(x: FloatArray) -> dict[str, Any]:
+        amplified = {name: held[name] * (x / at) ** AMPLIFIED[name] for name in scaled}
+        return {**block, varied: x, **held, **amplified}
+
+    end = max(_right_end(model, block, varied, inputs_at), 1.15 * at)
     x = np.linspace(0.0, end, _POINTS)
     x[0] = _START * end
-    answer = array_answer(model, {**block, varied: x, **held}, level, sites=sites)
+    answer = array_answer(model, inputs_at(x), level, sites=sites)
     in_range = answer.in_domain
     percent = exact_percent(level)
     if sites is not None and not np.isnan(answer.event_low).all():
@@ -173,8 +176,10 @@ def draw_curve(
     fails = FAILS.get(mode_of_kind(model.row.kind), "fails")
     axes.set(xlabel=AXIS[varied], ylabel=f"probability that the block {fails}")
     canvas.light_grid(axes)
+    if scaled:
+        axes.set_title("other measures in proportion", fontsize=8)
     if at > 0.0:
-        pointed = array_answer(model, {**block, varied: np.array([at]), **held}, level)
+        pointed = array_answer(model, inputs_at(np.array([at])), level)
         p = float(pointed.probability[0])
         axes.plot([at, at, 0.0], [0.0, p, p], color=RED, lw=0.9, ls="--")
         axes.plot(at, p, "o", ms=8, color=RED, mec="white", mew=1.2, zorder=9)
@@ -189,7 +194,10 @@ def _velocity_m_s(model: FragilityModel, block: Mapping[str, float]) -> float | 
 
 
 def _right_end(
-    model: FragilityModel, block: Mapping[str, float], varied: str, held: Mapping[str, float]
+    model: FragilityModel,
+    block: Mapping[str, float],
+    varied: str,
+    inputs_at: Callable[[FloatArray], Mapping[str, Any]],
 ) -> float:
     """Return the intensity at which the curve nearly reaches its maximum, found by doubling."""
     k, y_m_s = block[model.method.block.strength], _velocity_m_s(model, block)
@@ -197,10 +205,6 @@ def _right_end(
         y_m_s = 0.1 * k
     unit = y_m_s if varied in ("pgv_m_s", "xp_m_s") else 0.1 * y_m_s if varied == "pgd_m" else k
     x = unit * 2.0 ** np.arange(0.0, 12.0, 0.5)
-    answer = array_answer(model, {**block, varied: x, **held})
-    high = np.flatnonzero(answer.probability > 0.97)
-    if high.size:
-        return float(x[high[0]])
-    # a curve with a lower ceiling: as far as it still grows
+    answer = array_answer(model, inputs_at(x))
     top = float(np.nanmax(answer.probability))
-    return float(x[int(np.argmax(answer.probability >= 0.99 * top))])
+    return float(x[int(np.argmax(answer.probability >= 0.97 * top))])

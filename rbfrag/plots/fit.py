@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import math
-import re
 from collections.abc import Mapping
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,11 +13,12 @@ from rbfrag.db.rows import CombinationTable
 from rbfrag.errors import InputError
 from rbfrag.fragility.fit.line import Bins, bin_variances
 from rbfrag.fragility.fit.result import CalibrationBins
-from rbfrag.fragility.method import TOPPLING_BLOCK, Form
+from rbfrag.fragility.method import TOPPLING_BLOCK
 from rbfrag.fragility.methods.wls import mean_m_s, variance_m2_s2
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.plots import canvas
 from rbfrag.plots.canvas import as_written
+from rbfrag.plots.equation import equation_lines
 from rbfrag.plots.model_lines import depends_on_size, failure_line, predicted_strengths, smooth_line
 
 if TYPE_CHECKING:
@@ -41,7 +41,7 @@ def plot_fit(
     path: canvas.Out,
     *,
     log: bool = False,
-    xp_m_s: NDArray[np.float64] | None = None,
+    measures: Mapping[str, NDArray[np.float64]] = MappingProxyType({}),
 ) -> canvas.Picture:
     """Draw critical toppling velocities against intensity with the lines of a model.
 
@@ -56,7 +56,8 @@ def plot_fit(
 
     Args:
         log: logarithmic axes.
-        xp_m_s: toppling spectrum of each row [m/s], which models of the term xp need.
+        measures: columns by name that are not of the table: the toppling spectrum [m/s] and the
+            spectral accelerations [g], of models that read them.
 
     Raises:
         InputError: nothing to draw, or a path that cannot be written.
@@ -74,11 +75,10 @@ def plot_fit(
             "rbfrag plot calibration"
         )
     alone = not depends_on_size(model)
-    spectrum = np.full(table.p2.shape, np.nan) if xp_m_s is None else xp_m_s
     if alone:
         x = np.asarray(term.intensity_m_s({name: table.measure(name) for name in term.inputs}))
     else:
-        x = predicted_strengths(model, table, spectrum, 0.5)
+        x = predicted_strengths(model, table, 0.5, measures)
     shown = (table.status == "found") & np.isfinite(x) & np.isfinite(table.y_m_s)
     if not shown.any():
         raise InputError(
@@ -98,7 +98,7 @@ def plot_fit(
         elif probability == 0.5:
             lines.append((line_x, line_x))
         else:
-            strengths = predicted_strengths(model, table, spectrum, probability)
+            strengths = predicted_strengths(model, table, probability, measures)
             there = np.isfinite(expected) & np.isfinite(strengths)
             reach = line_x[(line_x >= x.min()) & (line_x <= x.max())] if there.any() else line_x[:0]
             lines.append((reach, smooth_line(expected[there], strengths[there], reach)))
@@ -181,79 +181,6 @@ def _draw_variance(
     labels = [f"{off.size} bins", "fitted variance", f"{off.sum()} bins missed by a factor above 2"]
     above: Any = {"loc": "lower left", "bbox_to_anchor": (0.0, 1.0), "ncols": 3}
     axes.legend([dots, curve, missed], labels, **above, fontsize=8, frameon=False)
-
-
-_TERMS_A_LINE = 5
-
-
-def equation_lines(model: FragilityModel) -> list[str]:
-    """Return the equation of P with rounded coefficients, and its symbols with their units.
-
-    Args:
-        model: a model of blocks known by p² and k_r.
-
-    Returns:
-        Lines of text with mathtext.
-    """
-    form, coefficients = model.form, model.row.coefficients
-    factor = form.size_factor
-    eta = r"\eta" if factor is None else r"\eta/h"
-
-    def number_of(match: re.Match[str]) -> str:
-        sign, function, name = match[1], match[2], match[3]
-        if name == "sum":
-            return _sum(form, coefficients)
-        value = math.exp(coefficients[name]) if function else coefficients[name]
-        return rounded(value, signed=bool(sign))
-
-    right, where = (
-        re.sub(r"<(\+?)(exp )?([^>]+)>", number_of, template)
-        for template in (form.equation, form.where)
-    )
-    first, *further_lines = right.split("\n")
-    lines = [rf"$P = {model.method.link.formula},\quad {eta} = {first}$"]
-    lines += [rf"${other}$" for other in further_lines]
-    if factor is not None:
-        where = ",\\ ".join(part for part in (f"h = {factor.formula}", where) if part)
-    if where:
-        unit = r"\ \mathrm{[m^2/s^2]}" if r"\sigma^2" in where else ""
-        lines.append(f"${where}{unit}$")
-    symbol = model.term.symbol.replace("π", r"$\pi$").replace("·", " ")
-    units = rf"$x$ = {symbol} [m/s],  $y = k_r\,g/p$ [m/s]"
-    reads_p = factor is not None or r"\ln p" in right
-    lines.append(units + (",  $p$ [1/s]" if reads_p else ""))
-    return lines
-
-
-def rounded(value: float, *, signed: bool = False) -> str:
-    """Return a number with three significant digits as mathtext.
-
-    Args:
-        signed: with its sign and blanks around it, as a further term of a sum.
-    """
-    size = abs(value)
-    text = f"{size:#.3g}".rstrip(".")
-    if "e" in text or 0.0 < size < 1e-3:
-        exponent = math.floor(math.log10(float(f"{size:.2e}")))
-        text = rf"{size / 10.0**exponent:#.3g}\times10^{{{exponent}}}"
-    if signed:
-        return f" {'-' if value < 0.0 else '+'} {text}"
-    return f"-{text}" if value < 0.0 else text
-
-
-def _sum(form: Form, coefficients: Mapping[str, float]) -> str:
-    """Return the sum over the parameters, with a few terms per line."""
-    text = ""
-    count = 0
-    for name, term in zip(form.parameters, form.terms, strict=True):
-        if not term or name not in coefficients:
-            continue
-        if count and count % _TERMS_A_LINE == 0:
-            text += "\n"
-        text += rounded(coefficients[name], signed=count > 0)
-        text += "" if term == "1" else rf"\,{term}"
-        count += 1
-    return text
 
 
 COLOURS = ("#1f4e79", "#d98c1f", "#4c9a6a", "#8c2d4f")

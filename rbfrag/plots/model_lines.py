@@ -5,145 +5,157 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 from scipy.optimize.elementwise import find_root
 
 from rbfrag.db.rows import CombinationTable
 from rbfrag.errors import InputError
-from rbfrag.fragility.method import SINGLE
+from rbfrag.fragility.measures import SINGLE_TERMS
+from rbfrag.fragility.method import arrays
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.fragility.prediction import array_answer
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.solver.results import FloatArray
-from rbfrag.vocabulary.quantities import INTENSITY, QUANTITIES
+from rbfrag.vocabulary.quantities import QUANTITIES
+from rbfrag.vocabulary.spectral import period_of
 
-ONE_NUMBER_TERMS = ("pgv", "pgv_kr", "pga", "sa10", "pga_tm", "pgd_tm")
-"""Terms that are one number."""
-
-MORE_TERMS = ("pgv_pga", "pgv_pga_tm")
-"""Terms that are drawn over PGV, all else held."""
-
-# Not to be seen in models of y and one number; large blocks and short periods keep k_r below PGA.
+# Without effect on models of y over one intensity; large blocks and short periods keep k_r below
+# PGA.
 _ANY_P2 = 0.1
 _ANY_TM_S = 0.05
 
 
 @dataclass(frozen=True)
 class HeldMeasures:
-    """Block size and measures held constant in a figure.
+    """Abscissa of a chart, and the block size and intensity measures held constant in it.
 
     Args:
+        across: name of the measure of the abscissa; ``intensity_m_s`` for the intensity term [m/s]
+            of a model of :data:`SINGLE_TERMS`.
         p2: frequency parameter p² [1/s²].
-        pga_g: PGA [g], or None for one in proportion to PGV.
-        pgv_over_pga_s: PGV/(PGA g) [s] where PGA is in proportion.
-        tm_s: mean period [s].
-        block_inputs: what else is known of the block.
+        constants: measures held constant, by name.
+        pgv_over_pga_s: PGV/(PGA g) [s] of a model of PGV with PGA whose PGA is not held.
         words: what is held, for the caption; empty where nothing matters.
         size_is_given: whether the figure is of blocks of this size, and not of any.
+        block_inputs: further inputs of the block.
     """
 
+    across: str
     p2: float = _ANY_P2
-    pga_g: float | None = None
+    constants: Mapping[str, float] = field(default_factory=dict)
     pgv_over_pga_s: float = math.nan
-    tm_s: float = _ANY_TM_S
     words: str = ""
     size_is_given: bool = False
     block_inputs: Mapping[str, float] = field(default_factory=dict)
 
-    def measures(self, model: FragilityModel, x_m_s: FloatArray) -> dict[str, FloatArray]:
-        """Return the measures of motions of given intensities x [m/s], shape (n,)."""
-        first, *other_names = model.term.inputs
-        unit_inputs = dict.fromkeys(model.term.inputs, 1.0)
-        unit_inputs |= {"tm_s": self.tm_s, "p2": self.p2, "kr": 1.0}
-        # every term is in proportion to its first measure
-        unit = model.method.block.completed(unit_inputs, model.term, SINGLE)["intensity_m_s"]
-        measures = {first: x_m_s / unit}
-        if "pga_g" in other_names:
-            measures["pga_g"] = (
-                x_m_s / (self.pgv_over_pga_s * STANDARD_GRAVITY_M_S2)
-                if self.pga_g is None
-                else np.full(x_m_s.shape, self.pga_g)
-            )
-        if "tm_s" in other_names:
-            measures["tm_s"] = np.full(x_m_s.shape, self.tm_s)
-        return measures | {
-            name: np.full(x_m_s.shape, value) for name, value in self.block_inputs.items()
-        }
+    def values(self, model: FragilityModel, x: FloatArray, kr: FloatArray) -> dict[str, Any]:
+        """Return motions of the values x of the abscissa, with blocks of the held size and k_r."""
+        first = model.term.inputs[0]
+        values: dict[str, Any] = {"p2": self.p2, **self.constants, **self.block_inputs}
+        if self.across == "intensity_m_s":
+            # each of these terms is in proportion to its first measure
+            values[first] = x / model.term.intensity_m_s({**values, first: 1.0})
+        else:
+            values[self.across] = x
+        if "pga_g" in model.term.inputs and "pga_g" not in values:
+            values["pga_g"] = x / (self.pgv_over_pga_s * STANDARD_GRAVITY_M_S2)
+        return {"kr": kr, **{name: np.broadcast_to(v, x.shape) for name, v in values.items()}}
 
-    def values(
-        self, model: FragilityModel, x_m_s: FloatArray, kr: FloatArray
-    ) -> dict[str, FloatArray | float]:
-        """Return these motions, with blocks of the held size and given k_r."""
-        return {"p2": self.p2, "kr": kr, **self.measures(model, x_m_s)}
+    def scale_m_s(self, x: FloatArray) -> FloatArray:
+        """Return the velocity [m/s] that values of the abscissa correspond to, roughly."""
+        is_acceleration = self.across == "pga_g" or period_of(self.across) is not None
+        return x * STANDARD_GRAVITY_M_S2 / math.sqrt(self.p2) if is_acceleration else x
+
+
+def chart_axis(model: FragilityModel) -> str | None:
+    """Return the abscissa of the design chart of a model, as in :class:`HeldMeasures`.
+
+    None for a model without a chart: one of several spectral accelerations, or of them with another
+    measure.
+    """
+    names = model.term.inputs
+    if model.term.name in SINGLE_TERMS:
+        return "intensity_m_s"
+    across = "pgv_m_s" if "pgv_m_s" in names else names[0]
+    held = {"tm_s", "magnitude"} | ({"pga_g"} if across == "pgv_m_s" else set())
+    return across if across != "xp_m_s" and {across, *held} >= {*names} else None
+
+
+def held_names(model: FragilityModel) -> list[str]:
+    """Return the names of the measures held constant in the design chart of a model."""
+    if not depends_on_size(model):
+        return []
+    across, names = chart_axis(model), model.term.inputs
+    return [name for name in names if name != (names[0] if across == "intensity_m_s" else across)]
 
 
 def held_measures(
-    model: FragilityModel,
-    *,
-    p2: float | None = None,
-    pga_g: float | None = None,
-    tm_s: float | None = None,
+    model: FragilityModel, *, p2: float | None = None, **constants: float | None
 ) -> HeldMeasures:
-    """Return the variables held constant in a figure of a model against one intensity.
+    """Return the variables held constant in a figure of a model against one intensity measure.
 
-    What is not given is the middle, of the logarithms, of the range that was fitted: p², Tm, and
-    PGV/(PGA g), to which PGA then keeps. Of a model that serves all sizes alike p² may be given for
-    the axis of k_r.
+    Default is the middle, of the logarithms, of the fitted range of p² and T_m, and a PGA in
+    proportion to PGV, with the middle of PGV/(PGA g). A model that serves all sizes alike may be
+    given p² for the axis of k_r.
 
     Args:
         p2: frequency parameter p² [1/s²].
-        pga_g: PGA [g].
-        tm_s: mean period [s].
+        constants: values of measures held constant, by name; None for the default.
 
     Raises:
-        InputError: a model that cannot be drawn so, a value that is not above zero, or one
-            that the model does not read.
+        InputError: a model without a chart, a value that is not above zero, or one that the model
+            does not use.
     """
-    name = model.term.name
-    if name not in (*ONE_NUMBER_TERMS, *MORE_TERMS):
+    across = chart_axis(model)
+    if across is None:
         raise InputError(
-            f"model {model.name!r} uses {' and '.join(model.term.inputs)}, not a single "
-            "intensity: this figure is for models of "
-            f"{', '.join((*ONE_NUMBER_TERMS, *MORE_TERMS))}"
+            f"model {model.name!r} uses {' and '.join(model.term.inputs)}: a design chart is of "
+            "one intensity measure, or of PGV with PGA (and Tm)"
         )
-    more, of_size = name in MORE_TERMS, depends_on_size(model)
-    read = {"p2": True, "pga_g": more, "tm_s": name == "pgv_pga_tm"}
-    for held, value in (("p2", p2), ("pga_g", pga_g), ("tm_s", tm_s)):
+    held = held_names(model)
+    for name, value in (("p2", p2), *constants.items()):
         if value is None:
             continue
-        if not read[held]:
+        if name not in ("p2", *held):
             raise InputError(
-                f"{held} = {value:g} has no effect: the lines of model {model.name!r} do not "
-                "depend on it; omit it",
-                fields=(held,),
+                f"{name} = {value:g} has no effect: the chart of model {model.name!r} does not "
+                "depend on it, or it is an axis; omit it",
+                fields=(name,),
             )
         if not 0.0 < value < math.inf:
-            raise InputError(f"{held} = {value:g} is not above zero", fields=(held,))
-    if not of_size:
-        return HeldMeasures() if p2 is None else HeldMeasures(p2, size_is_given=True)
-    size = _middle(model, "p2") if p2 is None else p2
+            raise InputError(f"{name} = {value:g} is not above zero", fields=(name,))
+    if not depends_on_size(model):
+        any_tm = {"tm_s": _ANY_TM_S} if "tm_s" in model.term.inputs else {}
+        return HeldMeasures(across, p2 or _ANY_P2, any_tm, size_is_given=p2 is not None)
+    size, ratio = p2 or _middle(model, "p2"), math.nan
+    values: dict[str, float] = {}
     words = [f"p² = {size:.3g} 1/s²"]
-    if not more:
-        return HeldMeasures(size, words=f"at {words[0]}", size_is_given=True)
-    ratio = _middle(model, "pgv_over_pga_s")
-    words.append(f"PGA = {pga_g:g} g" if pga_g is not None else f"PGV/(PGA g) = {ratio:.3g} s")
-    period = _ANY_TM_S
-    if name == "pgv_pga_tm":
-        period = _middle(model, "tm_s") if tm_s is None else tm_s
-        words.append(f"Tm = {period:.3g} s")
-    return HeldMeasures(size, pga_g, ratio, period, "at " + ", ".join(words), size_is_given=True)
+    for name in held:
+        if name == "pga_g" and constants.get(name) is None:
+            ratio = _middle(model, "pgv_over_pga_s")
+            words.append(f"PGV/(PGA g) = {ratio:.3g} s")
+            continue
+        values[name] = constants.get(name) or _middle(model, name)
+        symbol = QUANTITIES[name].symbol.replace("_", "")
+        words.append(f"{symbol} = {values[name]:.3g} {QUANTITIES[name].unit}".rstrip())
+    return HeldMeasures(across, size, values, ratio, "at " + ", ".join(words), size_is_given=True)
 
 
 def depends_on_size(model: FragilityModel) -> bool:
     """Return whether P of a model depends on p² at the same y and intensity."""
-    if model.term.name not in ONE_NUMBER_TERMS:
+    if model.term.name not in SINGLE_TERMS:
         return True
     x = np.ones(_RATIOS.size)
+    constants = {"tm_s": _ANY_TM_S} if "tm_s" in model.term.inputs else {}
     least, most = (
         array_answer(
             model,
-            HeldMeasures(p2).values(model, x, _RATIOS * math.sqrt(p2) / STANDARD_GRAVITY_M_S2),
+            HeldMeasures("intensity_m_s", p2, constants).values(
+                model, x, _RATIOS * math.sqrt(p2) / STANDARD_GRAVITY_M_S2
+            ),
         ).probability
         for p2 in (0.3, 10.0)
     )
@@ -165,17 +177,17 @@ def _middle(model: FragilityModel, name: str) -> float:
 
 
 _LOWEST, _HIGHEST = 1e-4, 50.0
-"""Range of y/x in which a block of given probability is looked for."""
+"""Range of y over its scale in which a block of given probability is looked for."""
 
 
 def failure_line(
-    model: FragilityModel, x_m_s: FloatArray, probability: float, held: HeldMeasures | None = None
+    model: FragilityModel, x: FloatArray, probability: float, held: HeldMeasures | None = None
 ) -> FloatArray:
     """Return the toppling velocity y [m/s] that fails with a given probability.
 
     Args:
-        model: a model of a term that is one number, or of PGV with PGA.
-        x_m_s: intensities [m/s], shape (n,), > 0.
+        model: a model with a chart (:func:`chart_axis`).
+        x: values of the abscissa, shape (n,), > 0.
         held: what does not change along the line; None for the middle of the fitted ranges.
 
     Returns:
@@ -184,55 +196,57 @@ def failure_line(
     """
     held = held_measures(model) if held is None else held
 
-    def toppling(y_m_s: FloatArray, x_m_s: FloatArray) -> FloatArray:
+    def toppling(y_m_s: FloatArray, x: FloatArray) -> FloatArray:
         kr = y_m_s * math.sqrt(held.p2) / STANDARD_GRAVITY_M_S2
-        return array_answer(model, held.values(model, x_m_s, kr)).probability
+        return array_answer(model, held.values(model, x, kr)).probability
 
-    return _of_probability(probability, toppling, x_m_s)
+    return _of_probability(probability, toppling, held.scale_m_s(x), x)
 
 
 def _of_probability(
-    probability: float, toppling: Callable[..., FloatArray], x_m_s: FloatArray, *columns: FloatArray
-) -> FloatArray:
-    """Return y [m/s] of given probability where toppling(y, x, *others) decreases with y."""
-    ends = np.log(_LOWEST * x_m_s), np.log(_HIGHEST * x_m_s)
+    probability: float, toppling: Callable[..., FloatArray], scale_m_s: FloatArray,
+    *columns: FloatArray,
+) -> FloatArray:  # fmt: skip
+    """Return y [m/s] of given probability where toppling(y, *columns) decreases with y.
+
+    Args:
+        scale_m_s: velocity [m/s] of which y is a reasonable multiple.
+    """
+    ends = np.log(_LOWEST * scale_m_s), np.log(_HIGHEST * scale_m_s)
     root = find_root(
-        lambda ln_y, *columns: toppling(np.exp(ln_y), *columns) - probability,
-        ends,
-        args=(x_m_s, *columns),
+        lambda ln_y, *columns: toppling(np.exp(ln_y), *columns) - probability, ends, args=columns
     )
     return np.asarray(np.exp(root.x), dtype=np.float64)
 
 
 def predicted_strengths(
-    model: FragilityModel, table: CombinationTable, xp_m_s: FloatArray, probability: float
+    model: FragilityModel,
+    table: CombinationTable,
+    probability: float,
+    measures: Mapping[str, FloatArray] = MappingProxyType({}),
 ) -> FloatArray:
     """Return the toppling velocity y [m/s] of given failure probability for each motion.
 
     Args:
-        xp_m_s: toppling spectrum of each row [m/s], shape (n,).
+        measures: columns by name, shape (n,), which replace those of the table: the toppling
+            spectrum and spectral accelerations.
 
     Returns:
-        Shape (n,); NaN where what the model reads is not known.
+        Shape (n,); NaN where a predictor of the model is not known.
     """
-    stored = (name for name in INTENSITY if QUANTITIES[name].stored)
-    columns = {name: table.measure(name) for name in ("p2", *stored)} | {"xp_m_s": xp_m_s}
-    inputs = {name: columns[name] for name in ("p2", *model.term.inputs)}
-    with np.errstate(divide="ignore", invalid="ignore"):
-        p = np.sqrt(table.p2)
-        x = np.asarray(model.term.intensity_m_s({**inputs, "p": p}), dtype=np.float64)
-    valid = np.isfinite(x) & (x > 0.0)
-    for name in model.term.inputs:
-        valid &= np.isfinite(inputs[name])
+    names = ("p2", *model.term.inputs)
+    inputs = {n: measures[n] if n in measures else table.measure(n) for n in names}
+    valid = np.all([np.isfinite(column) & (column > 0.0) for column in inputs.values()], axis=0)
     inputs = {name: column[valid] for name, column in inputs.items()}
+    scale_m_s = model.completed({**inputs, "kr": np.ones(valid.sum())}, arrays())["intensity_m_s"]
 
-    def toppling(y_m_s: FloatArray, _: FloatArray, *columns: FloatArray) -> FloatArray:
+    def toppling(y_m_s: FloatArray, *columns: FloatArray) -> FloatArray:
         block_inputs = dict(zip(inputs, columns, strict=True))
         kr = y_m_s * np.sqrt(block_inputs["p2"]) / STANDARD_GRAVITY_M_S2
         return array_answer(model, {**block_inputs, "kr": kr}, interval=False).probability
 
-    result = np.full(x.shape, np.nan)
-    result[valid] = _of_probability(probability, toppling, x[valid], *inputs.values())
+    result = np.full(valid.shape, np.nan)
+    result[valid] = _of_probability(probability, toppling, scale_m_s, *inputs.values())
     return result
 
 

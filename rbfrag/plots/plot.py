@@ -12,9 +12,9 @@ from rbfrag.db.engine import opened_database
 from rbfrag.db.models import load_model
 from rbfrag.db.queries import combination_table
 from rbfrag.errors import InputError
-from rbfrag.fragility.measures import MEASURES, spectral
+from rbfrag.fragility.measures import TERMS
 from rbfrag.fragility.model import FragilityModel
-from rbfrag.fragility.model_selection import find_model, stored_row
+from rbfrag.fragility.model_selection import find_model, stored_row, unused_measures
 from rbfrag.fragility.prediction import Prediction
 from rbfrag.motions.polarity import Polarity
 from rbfrag.motions.readers import MotionLike, as_motion
@@ -24,6 +24,7 @@ from rbfrag.question.keywords import LEVEL, model_for, parts_of
 from rbfrag.question.nominal import described
 from rbfrag.results.diagnostic import diagnostics
 from rbfrag.vocabulary.quantities import BLOCKS, INTENSITY, RANGE
+from rbfrag.vocabulary.spectral import SPECTRUM_PERIODS_S, period_of, spectral_name
 
 if TYPE_CHECKING:
     from rbfrag.plots.hazard import plot_contribution as hazard
@@ -93,7 +94,11 @@ def fit(
             "today; fitting it again takes them",
         )
     )
-    picture = plot_fit(source.table, fitted, out, log=log, xp_m_s=source.xp_m_s)
+    measures = {"xp_m_s": source.xp_m_s}
+    if source.spectra is not None:
+        measures |= zip(map(spectral_name, SPECTRUM_PERIODS_S), source.spectra.T, strict=True)
+    fitted = fitted.for_inputs((*fitted.term.inputs, *measures))
+    picture = plot_fit(source.table, fitted, out, log=log, measures=measures)
     return replace(picture, warnings=warnings)
 
 
@@ -113,11 +118,11 @@ def chart(
 
     Args:
         out: as for :func:`fit`.
-        model: model of one measure, or of PGV with PGA (and Tm); None for the one that answers
-            for PGV.
+        model: a model, drawn over PGV, PGA or SA; None for the one that answers for PGV and the
+            given measures.
         p2: frequency parameter p² of the blocks [1/s²]; None for the middle of the fitted range.
-        pga_g: PGA of the motions [g]; None for one in proportion to PGV.
-        tm_s: mean period of the motions [s]; None for the middle of the fitted range.
+        pga_g: PGA of the motions [g], with PGV as the abscissa; None for one in proportion to PGV.
+        tm_s: mean period of the motions [s], of models that use it.
         displacement_m: of a model of slides the displacement that is too far [m]; None likewise.
         db: as for :func:`fit`.
     """
@@ -125,15 +130,19 @@ def chart(
     from rbfrag.plots.chart import plot_chart
     from rbfrag.plots.model_lines import held_measures
 
-    rotation = None if model is None else FragilityModel.from_row(stored_row(model, db)).criterion
-    measures = ["pgv_m_s"] if model is None else MEASURES
-    chosen = find_model(model, measures, db, rotation_deg=rotation)
+    row = None if model is None else stored_row(model, db)
+    rotation = None if row is None else FragilityModel.from_row(row).criterion
+    measures = {"pga_g": pga_g, "tm_s": tm_s}
+    names = [name for name, value in measures.items() if value is not None]
+    names += ["pgv_m_s"] if row is None or pga_g is not None else []
+    names += [] if row is None else TERMS[row.term].inputs or ["sa(1)"]
+    chosen = find_model(model, names, db, rotation_deg=rotation)
     if chosen.method.block.kind != TOPPLING_BLOCK.kind:
         from rbfrag.plots.chart import plot_kind_chart
 
         size = next((n for n in chosen.method.block.names if not n.startswith("k")), "p2")
         size = "p2" if size == "displacement_m" else size
-        inputs = {size: p2, "pga_g": pga_g, "tm_s": tm_s, "displacement_m": displacement_m}
+        inputs = {size: p2, **measures, "displacement_m": displacement_m}
         return plot_kind_chart(
             chosen, out, {name: value for name, value in inputs.items() if value is not None}
         )
@@ -142,7 +151,7 @@ def chart(
             f"displacement_m is for sliding: model {chosen.name!r} does not use it",
             fields=("displacement_m",),
         )
-    held = held_measures(chosen, p2=p2, pga_g=pga_g, tm_s=tm_s)
+    held = held_measures(chosen, p2=p2, **measures)
     return plot_chart(chosen, out, held)
 
 
@@ -167,8 +176,8 @@ def planes(
     return plot_planes({name: plane_of(text, name) for name, text in plane_texts.items()}, out)
 
 
-VARIED = {"pgv": "pgv_m_s", "pga": "pga_g", "pgd": "pgd_m", "sa10": "sa10_g"}
-"""What a curve may run over."""
+VARIED = {"pgv": "pgv_m_s", "pga": "pga_g", "pgd": "pgd_m"}
+"""What a curve may run over, beside a spectral acceleration by its name."""
 
 
 class FragilityCurveKeywords(
@@ -177,7 +186,6 @@ class FragilityCurveKeywords(
     """Keywords of a fragility curve: block, held measures and model."""
 
     out: Out
-    sa_g: Mapping[float, float] | None
 
 
 def curve(
@@ -196,8 +204,8 @@ def curve(
         p2: frequency parameter p² of the block [1/s²], if it is not given by name.
         kr: its toppling yield acceleration coefficient, likewise.
         out: as for :func:`fit`; it may be given by name.
-        over: what the curve runs over: pgv, pga, pgd or sa10; None for pgv, or
-            what the model reads first.
+        over: abscissa: pgv, pga, pgd or a spectral acceleration such as sa(1); None for pgv, or
+            the first predictor of the model that is not held.
         compared: gives other fragilities to compare with, by name, for the measure that the curve
             runs over.
         question: fields of the block, with ``kind``, the measures that are held, and ``model``,
@@ -207,29 +215,27 @@ def curve(
 
     numbers = [number for number in (p2, kr) if number is not None]
     block, held, answering, drawing = parts_of(
-        numbers, question, BLOCKS, INTENSITY, RANGE, ("out", "sa_g")
+        numbers, question, BLOCKS, INTENSITY, RANGE, ("out",)
     )
-    held |= spectral(drawing.get("sa_g") or {})
     kind = block.pop("kind", None)
     blocks = described(block, kind)
     (group,) = blocks.groups
-    varied = None if over is None else VARIED.get(over)
+    varied = None if over is None else over if period_of(over) is not None else VARIED.get(over)
     if over is not None and varied is None:
-        raise InputError(f"over = {over}: use {', '.join(VARIED)}")
-    if "model" in answering:
-        chosen = model_for(answering, (*group.numbers, *MEASURES), group.kind)
-        varied = varied or chosen.term.inputs[0]
-    else:
-        varied = varied or "pgv_m_s"
-        chosen = model_for(answering, (*group.numbers, varied, *held), group.kind)
+        raise InputError(f"over = {over}: use {', '.join(VARIED)} or sa(1)")
+    if varied is None and (name := answering.get("model")) is not None:
+        term = TERMS[stored_row(name, answering.get("db")).term]
+        varied = next((n for n in term.inputs or ("sa(1)",) if n not in held), None)
+    varied = varied or "pgv_m_s"
     if varied in held:
         raise InputError(f"{varied} is the axis of the curve: omit its value, or give another axis")
+    chosen = model_for(answering, (*group.numbers, varied, *held), group.kind)
     comparisons = {} if compared is None else compared(varied)
     picture = plot_curve(
         chosen, group.numbers, drawing.get("out", out), over=varied, fixed=held,
         level=answering.get("level", LEVEL), compared=comparisons, sites=answering.get("sites"),
     )  # fmt: skip
-    return replace(picture, warnings=blocks.remarks)
+    return replace(picture, warnings=(*blocks.remarks, *unused_measures(chosen, held)))
 
 
 def critical(

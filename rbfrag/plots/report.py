@@ -18,8 +18,6 @@ from typing import TYPE_CHECKING, Any, Unpack
 
 from rbfrag.errors import InputError
 from rbfrag.files import output_path, write_text, written_whole
-from rbfrag.fragility import describe
-from rbfrag.fragility.measures import spectral
 from rbfrag.hazards.branches import Weights
 from rbfrag.hazards.curve import CurveKeywords
 from rbfrag.hazards.curve_file import CurveLike
@@ -28,7 +26,6 @@ from rbfrag.plots.canvas import BLUE, freeze_layout, in_own_style, new_figure, s
 from rbfrag.plots.chart import draw_chart
 from rbfrag.plots.curve import AXIS, draw_curve
 from rbfrag.plots.hazard import draw_contribution
-from rbfrag.plots.model_lines import MORE_TERMS
 from rbfrag.plots.report_contents import (
     COLUMNS,
     SYMBOL,
@@ -63,7 +60,6 @@ class ReportKeywords(
     """Keywords of a report: block, shaking or scenario, hazard curve and model."""
 
     rotation_deg: float | None
-    sa_g: Mapping[float, float] | None
 
 
 def report(
@@ -88,7 +84,7 @@ def report(
         years: period of the probability [a].
         title: title of the page.
         date: date that is printed on it; nothing is, if empty.
-        question: fields of block and shaking or scenario, ``sa_g`` and ``kind``, ``model`` (a
+        question: fields of block and shaking or scenario, ``kind``, ``model`` (a
             name), ``level``, ``sites`` and ``db`` as :func:`rbfrag.predict` has them; ``imt``,
             ``site``, ``convert`` and ``convert_sigma`` of the curve as :func:`rbfrag.hazard` has
             them; ``component`` of the measures and of the curve.
@@ -101,10 +97,10 @@ def report(
         UnknownFieldError: a keyword that is none.
     """
     of_shaking = (*SHAKING, *SOURCE, *RANGE, "rotation_deg")
-    block, shaking, spectrum, meaning = parts_of(
-        (), question, BLOCKS, of_shaking, ("sa_g",), CurveKeywords.__optional_keys__
+    block, shaking, meaning = parts_of(
+        (), question, BLOCKS, of_shaking, CurveKeywords.__optional_keys__
     )
-    request = {**block, **shaking, **spectral(spectrum.get("sa_g") or {})}
+    request = {**block, **shaking}
     if (component := meaning.get("component")) is not None:
         request["component"] = component
     rate = RateQuestion(curve, years, meaning, weights)
@@ -147,7 +143,7 @@ def _panels_of(contents: Contents) -> dict[str, str]:
     if contents.prediction.sensitivity:
         panels["sensitivity"] = "P at usual errors of measurement"
     if contents.held is not None:
-        panels["chart"] = f"Design chart, model {describe.model(vars(contents.prediction))}"
+        panels["chart"] = f"Design chart, model {contents.model.name}"
     if contents.hazard is not None:
         panels["rate"] = "Hazard, and the shaking that the rate comes from"
     return panels
@@ -187,21 +183,19 @@ def _draw_panel(part: FigureBase, name: str, contents: Contents) -> None:
         axes.set_xlabel("out of the slope, from the centroid [m]")
         axes.set_ylabel("above the centroid [m]")
     elif name == "curve":
-        first, *other_names = model.term.inputs
-        fixed = {name: measures[name] for name in other_names}
+        fixed = {name: measures[name] for name in model.term.inputs}
+        across = "pgv_m_s" if "pgv_m_s" in fixed else model.term.inputs[0]
+        at = fixed.pop(across)
         draw_curve(
-            axes, model, contents.numbers, first, fixed, level=prediction.level,
-            at=measures[first], sites=prediction.sites,
+            axes, model, contents.numbers, across, fixed, level=prediction.level, at=at,
+            sites=prediction.sites,
         )  # fmt: skip
         part.legend(loc="outside lower center", fontsize=7, frameon=False)
     else:
         assert contents.held is not None
-        by_pgv = model.term.name in MORE_TERMS
-        x, y_m_s = measures["pgv_m_s"] if by_pgv else prediction.intensity_m_s, prediction.y_m_s
+        x, y_m_s = measures.get(contents.held.across, prediction.intensity_m_s), prediction.y_m_s
         draw_chart(axes, model, contents.held, point=None if y_m_s is None else (x, y_m_s))
         axes.set_ylabel("toppling velocity, $y = k_r\\,g/p$ [m/s]")
-        if model.term.inputs == ("pgv_m_s",):
-            axes.set_xlabel(AXIS["pgv_m_s"])
         if contents.held.words:
             axes.set_title(contents.held.words, fontsize=8)
 

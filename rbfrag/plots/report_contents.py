@@ -13,7 +13,6 @@ import numpy as np
 
 from rbfrag.errors import InputError
 from rbfrag.fragility import describe
-from rbfrag.fragility.measures import TERMS
 from rbfrag.fragility.method import TOPPLING_BLOCK
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.fragility.model_selection import find_model
@@ -24,7 +23,7 @@ from rbfrag.hazards.curve_file import CurveLike, as_curves
 from rbfrag.hazards.hazard_answer import HazardAnswer
 from rbfrag.hazards.hazard_rates import hazard, with_drained_rates
 from rbfrag.plots.canvas import mode_title
-from rbfrag.plots.model_lines import MORE_TERMS, ONE_NUMBER_TERMS, HeldMeasures, held_measures
+from rbfrag.plots.model_lines import HeldMeasures, chart_axis, held_measures, held_names
 from rbfrag.plots.spectrum import block_size_m
 from rbfrag.question.classify import Shape, shape_of
 from rbfrag.question.document import answer_block
@@ -47,6 +46,7 @@ from rbfrag.vocabulary.quantities import (
     SHAKING,
     word_of,
 )
+from rbfrag.vocabulary.spectral import SpectralSet
 
 SYMBOL = re.compile(r"\b([kp])_([a-z])(?![a-z_])")
 """A symbol with its index, k_r for example."""
@@ -150,9 +150,8 @@ def contents_of(
     medians = {name: about["median"] for name, about in (prediction.shaking or {}).items()}
     measures = {name: value for name, value in read.items() if name in INTENSITY} | medians
     model = find_model(
-        prediction.model, TERMS[prediction.term].inputs, how.get("db"),
-        rotation_deg=how.get("rotation_deg"),
-    )  # fmt: skip
+        prediction.model, measures, how.get("db"), rotation_deg=how.get("rotation_deg")
+    )
     annual = _annual_rate({**numbers, "kind": facts.kind}, rate, how)
     if annual is not None and prediction.drained is not None:
         (dry,) = described(without_water(inputs), options.get("kind")).groups
@@ -188,7 +187,7 @@ def contents_of(
 
 
 OF_BLOCK = frozenset((*BLOCK, *COMMON))
-OF_REQUEST = (*SHAKING, "component", "mechanism", "gmm")
+OF_REQUEST = SpectralSet((*SHAKING, "component", "mechanism", "gmm"))
 """Fields of the shaking that a report prints as they were given."""
 
 
@@ -425,16 +424,13 @@ def _held(
 ) -> HeldMeasures | None:
     """Return the variables held constant in the design chart; None for a model without a chart."""
     block_inputs = {name: v for name, v in numbers.items() if not name.endswith("_sigma")}
-    if model.term.name not in (*ONE_NUMBER_TERMS, *MORE_TERMS) or not all(
+    if chart_axis(model) is None or not all(
         block_inputs.pop(name, 0.0) for name in TOPPLING_BLOCK.names
     ):
         return None
-    read = {
-        name: measures[name]
-        for name in ("pga_g", "tm_s")
-        if name in model.term.inputs and model.term.name in MORE_TERMS
-    }
-    return replace(held_measures(model, p2=numbers["p2"], **read), block_inputs=block_inputs)
+    constants = {name: measures[name] for name in held_names(model)}
+    held = held_measures(model, p2=numbers["p2"], **constants)
+    return replace(held, block_inputs=block_inputs)
 
 
 def _drawing(

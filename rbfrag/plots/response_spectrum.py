@@ -9,12 +9,12 @@ import numpy as np
 from rbfrag.errors import InputError
 from rbfrag.motions.readers import MotionLike, as_motion
 from rbfrag.motions.response_spectrum import (
-    SPECTRUM_PERIODS_S,
     DirectionalPeaks,
     spectral_accelerations,
 )
 from rbfrag.plots import canvas
 from rbfrag.plots.canvas import as_written
+from rbfrag.vocabulary.spectral import SPECTRUM_PERIODS_S
 
 _LINE, _RECORDING = "#1f4e79", {50: ("#d98c1f", "s"), 100: ("#8c2d4f", "^")}
 _POINTS = 121

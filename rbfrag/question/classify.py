@@ -57,6 +57,7 @@ from rbfrag.vocabulary.quantities import (
     SPACE,
     column_of,
 )
+from rbfrag.vocabulary.spectral import SpectralSet
 
 if TYPE_CHECKING:
     import numpy as np
@@ -305,7 +306,7 @@ class _ScalarIssues:
             self.remarks.append(text.replaced(text=text.format(**values)) if values else text)
 
 
-_READ = frozenset((
+_READ = SpectralSet((
     *NUMBERS, "displacement_m", "restitution", *SHAPE, *PLANES, *JOINT, *SCATTER, *SHAKING, *COMMON,
 ))  # fmt: skip
 """Fields that shapes, models or the choice of one read."""

@@ -29,12 +29,10 @@ from rbfrag.errors import InputError
 from rbfrag.fragility.measures import AMPLIFIED
 from rbfrag.fragility.prediction import is_single, single
 from rbfrag.results.diagnostic import Diagnostic
-from rbfrag.vocabulary.quantities import SPECTRAL
+from rbfrag.vocabulary.spectral import period_of
 
 COMPONENT_SIGMA = 0.161
 """Dispersion of a single component about RotD50 or the geometric mean, in ln: .07 in log10."""
-
-_PERIODS = {name: period_s for period_s, name in SPECTRAL.items()}
 
 
 @dataclass(frozen=True)
@@ -68,8 +66,8 @@ class Component:
 
     def ratio(self, measure: str) -> float:
         """Return the ratio for an intensity measure, by its name in `predict`."""
-        if measure in _PERIODS:
-            return self.spectral_ratio(_PERIODS[measure])
+        if (period_s := period_of(measure)) is not None:
+            return self.spectral_ratio(period_s)
         if measure in ("pgv_m_s", "pgd_m"):
             return self.amplitude
         # PGA is SA(0.01 s); Arias intensity grows with the square of the acceleration
@@ -154,8 +152,9 @@ def to_single_component(inputs: Mapping[str, Any], component: Any) -> dict[str, 
     else:
         ratio, sigma = _conversion_of_rows(component)
     result = dict(inputs)
-    for name in AMPLIFIED.keys() & inputs.keys():
-        value = inputs[name]
+    for name, value in inputs.items():
+        if name not in AMPLIFIED:
+            continue
         if is_single(value):
             result[name] = single(name, value) / ratio(name)
         else:

@@ -7,7 +7,7 @@ from os import PathLike
 from typing import TYPE_CHECKING, Any
 
 from rbfrag.errors import InputError
-from rbfrag.fragility.measures import AMPLIFIED
+from rbfrag.fragility.measures import AMPLIFIED, MEASURES
 from rbfrag.fragility.model_selection import find_model, suited_models, unused_measures
 from rbfrag.fragility.prediction import Prediction, add_warnings, answer_given, with_values
 from rbfrag.question.classify import has_shape
@@ -15,7 +15,7 @@ from rbfrag.question.components import SINGLE_ASSUMED, to_single_component
 from rbfrag.question.drained_bound import with_drained_bound
 from rbfrag.question.nominal import MEASURED, OF_SHAKING, ask_at_rest, described
 from rbfrag.results.diagnostic import Diagnostic, diagnostics
-from rbfrag.vocabulary.quantities import INTENSITY, SCENARIO
+from rbfrag.vocabulary.quantities import SCENARIO
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -122,7 +122,7 @@ def answer_numbers(
         DatabaseError: the database cannot be read.
     """
     is_component_assumed = component is None and motion is None
-    source, inputs = (mechanism, gmm, component), question
+    source, inputs, is_scenario = (mechanism, gmm, component), question, False
     if source != (None, None, None) or not SCENARIO.isdisjoint(question):
         if motion is not None:
             raise InputError(
@@ -133,7 +133,7 @@ def answer_numbers(
         from rbfrag.question.scenario import SITE, Source, describe_source, shaken
 
         if source[:2] != (None, None) or not question.keys().isdisjoint(SITE):
-            is_component_assumed = False
+            is_component_assumed, is_scenario = False, True
             inputs = {**inputs, **describe_source(Source(mechanism, gmm))}
         question, further = shaken(question, Source(mechanism, gmm), model, db, component)
         remarks = (*remarks, *further)
@@ -160,13 +160,13 @@ def answer_numbers(
             )
         except InputError as error:
             # fields of the question, which each interface prints in its own spelling
-            error.fields = error.fields or INTENSITY
+            error.fields = error.fields or tuple(MEASURES)
             raise
         for suited_model in models:
             answer = answer_given(suited_model, question, level, weights=weights, sites=sites)
             assert isinstance(answer, Prediction)
             answers.append(answer)
-        unused = unused_measures(models[0], question)
+        unused = () if is_scenario else unused_measures(models[0], question)
         if is_component_assumed and 0.0 < answers[0].probability < 1.0:
             notes = (_as_rotd50(models[0], question, weights, answers[0].probability),)
     return with_values(

@@ -75,9 +75,7 @@ class MeasureFields(TypedDict, Generic[V], total=False):
     pga_g: V
     tm_s: V
     pgd_m: V
-    sa03_g: V
-    sa10_g: V
-    sa30_g: V
+    sa_g: Mapping[float, V] | None
     arias_m_s: V
     magnitude: V
 
@@ -87,9 +85,7 @@ class ShakingFields(MeasureFields[V], total=False):
 
     pgv_sigma: V
     pga_sigma: V
-    sa03_sigma: V
-    sa10_sigma: V
-    sa30_sigma: V
+    sa_sigma: Mapping[float, V] | None
     pgv_tau: V
     rjb_km: V
     vs30_m_s: V
@@ -158,8 +154,7 @@ class QuestionFields(
     density_sigma_kg_m3: V | str
     gmm_sigma: V
 
-    # spectral accelerations and ground motions
-    sa_g: Mapping[float, V] | None
+    # ground motions
     motion: MotionLike | None
     polarity: Polarity
 

@@ -15,6 +15,7 @@ from rbfrag.files import csv_rows, source_text
 from rbfrag.fragility.measures import SCATTERED, SIGMAS
 from rbfrag.question.bssa14 import Ordinate
 from rbfrag.question.table import columns_in
+from rbfrag.vocabulary.spectral import BY_PERIOD
 
 _CONTENT = "a table of medians and sigmas"
 _NEAREST_KM = 0.1
@@ -41,7 +42,7 @@ def read_gmm_table(path: str | PathLike[str]) -> Columns:
     if not rows:
         raise InputError(f"{path} is empty: give columns such as pgv_m_s and pgv_sigma")
     (_, header), *rest = rows
-    fields = {*SIGMAS, *SCATTERED, "pgv_tau", "rjb_km"}
+    fields = {*SIGMAS, *SCATTERED, *BY_PERIOD, "pgv_tau", "rjb_km"}
     table = {}
     for name, column in columns_in(header, path, fields).columns.items():
         place, values = header.index(column.header), []
@@ -59,7 +60,7 @@ def read_gmm_table(path: str | PathLike[str]) -> Columns:
                 )
             values.append(column.factor * value)
         table[name] = np.array(values)
-    if not rest or SIGMAS.keys().isdisjoint(table):
+    if not rest or not any(name in SIGMAS for name in table):
         raise InputError(f"{path} has no median: add columns such as pgv_m_s and pgv_sigma")
     if "rjb_km" not in table and len(rest) > 1:
         raise InputError(f"{path} has several rows: add the column rjb_km")

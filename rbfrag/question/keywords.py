@@ -9,6 +9,7 @@ from rbfrag.errors import InputError, UnknownFieldError
 from rbfrag.fragility.model_selection import find_model
 from rbfrag.solver.kinds import FREE_STANDING
 from rbfrag.vocabulary.quantities import INVERSE, MEASURED, ONLY_PREDICT
+from rbfrag.vocabulary.spectral import BY_PERIOD, input_of, spectral_inputs
 
 if TYPE_CHECKING:
     from rbfrag.fragility.model import FragilityModel
@@ -39,7 +40,10 @@ def parts_of(
     if len(numbers) > len(first) or not first.keys().isdisjoint(keywords):
         raise InputError("p2 and kr are given twice, by position and by name: give each once")
     inputs = {name: value for name, value in {**first, **keywords}.items() if value is not None}
-    return [{n: v for n, v in inputs.items() if n in part} for part in parts]
+    for name in BY_PERIOD:
+        if name in inputs:
+            inputs |= spectral_inputs(name, inputs.pop(name))
+    return [{n: v for n, v in inputs.items() if input_of(n) in part} for part in parts]
 
 
 def model_for(
@@ -80,7 +84,7 @@ def by_field_name(question: Mapping[str, Any], fields: Collection[str]) -> dict[
         field = name
         if name not in fields:
             match = field_of(name)
-            if match is None or match.field not in fields or match.unit is not None:
+            if match is None or input_of(match.field) not in fields or match.unit is not None:
                 raise unknown_field(name, fields)
             field = match.field
             if match.column == "no_back" and value is not None:

@@ -18,17 +18,19 @@ from rbfrag.fragility.prediction import (
     add_warnings,
     answer_given,
     is_single,
+    with_values,
 )
 from rbfrag.question.classify import Blocks, classify_block, has_shape, read_by_some
 from rbfrag.question.components import SINGLE_ASSUMED, SINGLE_COMPONENT
 from rbfrag.question.shape_validation import size_questions
-from rbfrag.results.diagnostic import Diagnostic
+from rbfrag.results.diagnostic import Diagnostic, diagnostics
 from rbfrag.solver.kinds import BY_MECHANICS, facts_of
 from rbfrag.vocabulary import quantities
 from rbfrag.vocabulary.quantities import (
     SCENARIO,
     SHAKING,
 )
+from rbfrag.vocabulary.spectral import SpectralSet
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -43,7 +45,7 @@ ONE_FOR_ALL = frozenset({"block", "back_fracture"})
 """Fields that hold one thing for all blocks."""
 
 
-OF_SHAKING = frozenset({*SHAKING, *MEASURES})
+OF_SHAKING = SpectralSet({*SHAKING, *MEASURES})
 """Fields that say nothing of the block."""
 
 
@@ -153,6 +155,9 @@ def ask_stated(
             level=level, db=db, nan=nan, interval=interval, weights=weights, component=component,
             rows=rows, draws=draws,
         )  # fmt: skip
+        if is_scenario:  # measures that the question does not name
+            remaining = [w for w in diagnostics(answer.warnings) if w.code != "unused_measures"]
+            answer = with_values(answer, warnings=tuple(remaining))
         return add_warnings(answer, remarks)
     how: dict[str, Any] = {"nan": nan, "interval": interval, "weights": weights, "sites": sites}
     if (kind is None or isinstance(kind, str)) and mode is None and not rows:

@@ -10,7 +10,6 @@ from textwrap import wrap
 from typing import TYPE_CHECKING, Any, Unpack, overload
 
 from rbfrag.errors import InputError
-from rbfrag.fragility.measures import spectral
 from rbfrag.fragility.prediction import Prediction, add_warnings, is_single
 from rbfrag.question.drained_bound import with_drained_bound
 from rbfrag.question.keywords import by_field_name
@@ -23,6 +22,7 @@ from rbfrag.question.nominal import (
     described,
 )
 from rbfrag.vocabulary.quantities import ARRAYS, INPUTS, INVERSE, QUANTITIES, QUESTION, REQUEST
+from rbfrag.vocabulary.spectral import BY_PERIOD, spectral_inputs
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -109,8 +109,8 @@ def predict(p2: Any = None, kr: Any = None, /, **question: Any) -> Prediction | 
             continue
         elif name == "kind":
             kind = value
-        elif name == "sa_g":
-            fields |= spectral(value)
+        elif name in BY_PERIOD:
+            fields |= spectral_inputs(name, value)
         elif name == "motion":
             motion = value
         elif name == "polarity":

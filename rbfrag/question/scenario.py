@@ -15,6 +15,7 @@ from typing import Any, NamedTuple
 
 from rbfrag.errors import InputError
 from rbfrag.fragility import describe
+from rbfrag.fragility.completion import used_inputs
 from rbfrag.fragility.measures import AMPLIFIED, SCATTERED, SIGMAS, TERMS
 from rbfrag.fragility.method import SINGLE, ArrayNamespace, arrays
 from rbfrag.fragility.model import FragilityModel, Model
@@ -25,6 +26,7 @@ from rbfrag.question.components import COMPONENT_SIGMA, to_single_component, tot
 from rbfrag.results.diagnostic import Diagnostic
 from rbfrag.results.result import Result, TextLine, TextTable
 from rbfrag.vocabulary.quantities import INTENSITY, MECHANISMS, QUANTITIES
+from rbfrag.vocabulary.spectral import spectral_names
 
 SITE = ("rjb_km", "vs30_m_s")
 """Fields that make a question one of a scenario."""
@@ -79,7 +81,8 @@ def shaken(
     Args:
         inputs: the question, in which magnitude, distance and ground may stand for measures.
         source: what else is said of the earthquake.
-        model: the model that is asked for, which reads its measures; None for PGV alone.
+        model: the model that is asked for, which reads its measures; None for PGV, PGA and the
+            response spectrum.
         db: its database.
         component: horizontal component of the measures, by name; None for single.
 
@@ -95,12 +98,9 @@ def shaken(
                 "predicts RotD50",
                 fields=("component",),
             )
-        names = ("pgv_m_s",) if model is None else TERMS[_term(model, db)].inputs
-        measures = scenario(inputs, source, names)
+        measures = scenario(inputs, source, _read(model, db, source))
         remarks = (ANOTHER_MODEL,)
-        question = {name: value for name, value in inputs.items() if name not in GROUND}
-        if "magnitude" in names and "magnitude" in inputs:
-            question["magnitude"] = inputs["magnitude"]
+        question = {name: value for name, value in inputs.items() if name not in SITE}
         ns = _numbers(inputs)
         for name, im in measures.items():
             question[name], question[SIGMAS[name]] = im.median, im.sigma(ns)
@@ -116,9 +116,8 @@ def shaken(
             raise InputError(
                 f"amplification = {factor:g}: give a factor above 0", fields=("amplification",)
             )
-        for name, power in AMPLIFIED.items():
-            if name in question:
-                question[name] = question[name] * factor**power
+        for name in filter(AMPLIFIED.__contains__, [*question]):
+            question[name] = question[name] * factor ** AMPLIFIED[name]
     return question, remarks
 
 
@@ -240,7 +239,8 @@ def scenario_shaking(inputs: Mapping[str, Any], source: Source) -> ScenarioShaki
     if source.gmm is not None:
         from rbfrag.question.gmm_table import read_gmm_table
 
-        names = tuple(name for name in SIGMAS if name in read_gmm_table(source.gmm))
+        columns = read_gmm_table(source.gmm)
+        names = tuple(n for n in (*SIGMAS, *spectral_names(columns)) if n in columns)
     result = {}
     for name, im in scenario(site, source, names).items():
         median = im.median * inputs.get("amplification", 1.0)
@@ -258,10 +258,19 @@ def _numbers(inputs: Mapping[str, Any]) -> ArrayNamespace:
     return SINGLE if all(is_single(inputs[n]) for n in names if n in inputs) else arrays()
 
 
-def _term(model: Model, db: str | PathLike[str] | None) -> str:
-    if isinstance(model, str):
-        return stored_row(model, db).term
-    return model.term.name if isinstance(model, FragilityModel) else model.term
+def _read(model: Model | None, db: str | PathLike[str] | None, source: Source) -> Collection[str]:
+    """Return the measures that answer a scenario: all, or those of the model that is asked for."""
+    measures: Collection[str] = MEASURES
+    if source.gmm is not None:
+        from rbfrag.question.gmm_table import read_gmm_table
+
+        measures = [name for name in read_gmm_table(source.gmm) if name in SIGMAS]
+    if model is None:
+        return measures
+    row = stored_row(model, db) if isinstance(model, str) else model
+    row = row.row if isinstance(row, FragilityModel) else row
+    velocity = FragilityModel.from_row(row).form.velocity
+    return used_inputs(TERMS[row.term], velocity, measures)
 
 
 def _checked(name: str, value: Any, mechanism: Any, ns: ArrayNamespace) -> Any:

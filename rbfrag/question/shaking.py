@@ -19,10 +19,12 @@ def doubts_about(measures: Mapping[str, Any]) -> Iterator[Diagnostic]:
         measures: values by the names of :func:`rbfrag.predict`, arrays or numbers; NaN is passed
             over.
     """
-    for name in measures.keys() & CREDIBLE.keys() & {*SHAKING}:
-        values = np.asarray(measures[name], dtype=np.float64)
+    for name, value in measures.items():
+        if name not in CREDIBLE or name not in SHAKING:
+            continue
+        values = np.asarray(value, dtype=np.float64)
         values = values[np.isfinite(values)]
         _, most, text = CREDIBLE[name]
         if values.size and (largest := float(values.max())) > most:
-            value = f"{name} = {largest:.4g} {QUANTITIES[name].unit}"
-            yield Diagnostic(f"{value} is {text}", "suspicious_value")
+            quantity = f"{name} = {largest:.4g} {QUANTITIES[name].unit}"
+            yield Diagnostic(f"{quantity} is {text}", "suspicious_value")

@@ -28,6 +28,18 @@ from rbfrag.vocabulary.quantities import (
     column_of,
     word_of,
 )
+from rbfrag.vocabulary.spectral import (
+    BY_PERIOD,
+    LONGEST_S,
+    SHORTEST_S,
+    input_of,
+    period_of,
+    spectral_name,
+)
+
+_SPECTRAL = re.compile(r"sa\s*\(\s*(\d*[.,]?\d+|\d+[.,])\s*s?\s*\)(_sigma)?")
+"""A spectral acceleration by its period, "sa(0.5)", or the standard deviation of its logarithm."""
+_LIKE_SPECTRAL = re.compile(r"p?sa\s*[\s_(]?\s*\d.*")
 
 _PRESSURES = {"pa": 1.0, "kpa": 1e3, "mpa": 1e6, "n/m2": 1.0, "kn/m2": 1e3, "mn/m2": 1e6}
 
@@ -149,7 +161,7 @@ def field_of(header: str) -> HeaderMatch | None:
     if (exact := _names().get(header)) is not None:
         return HeaderMatch(exact, None, "no_back" if header == "no_back" else exact)
     text = header.strip().lower()
-    if (name := _names().get(_as_name(text))) is not None:
+    if (name := _names().get(_as_name(text)) or _spectral_named(text)) is not None:
         return HeaderMatch(name, None, name)
     if bracket := _IN_BRACKETS.search(text):
         return _called(text[: bracket.start()], bracket[1])
@@ -166,9 +178,18 @@ def _as_name(text: str) -> str:
     return re.sub(r"[\s\-]+", "_", text.strip())
 
 
+def _spectral_named(text: str) -> str | None:
+    """Return the spectral acceleration, or its standard deviation, that a text names."""
+    match = _SPECTRAL.fullmatch(text.strip())
+    if match is None:
+        return None
+    name = spectral_name(float(match[1].replace(",", ".")))
+    return None if period_of(name) is None else name + (match[2] or "")
+
+
 def _called(text: str, unit: str | None = None) -> HeaderMatch | None:
     """Return the field of a header, without its unit."""
-    name = _names().get(_as_name(text))
+    name = _names().get(_as_name(text)) or _spectral_named(text)
     if name is not None:
         return HeaderMatch(name, unit, "no_back" if text == "no_back" else name)
     words = normalized_words(text)
@@ -307,7 +328,7 @@ class Header(NamedTuple):
             header: all columns of the table.
             used: the fields that it depends on, or hands on.
         """
-        headers = {column.header for name, column in self.columns.items() if name in used}
+        headers = {column.header for name, column in self.columns.items() if input_of(name) in used}
         carried = {text for text, field in self.unused.items() if field in CARRIED}
         names = [name for name in header if name not in headers | carried]
         earlier = [name for name in names if name in WRITTEN or name.startswith("annual_rate")]
@@ -341,7 +362,8 @@ class Header(NamedTuple):
                 )
         for text in self.unknown:
             field = sounds_like(text)
-            if field is None or not {field, *INSTEAD_OF.get(field, ())}.isdisjoint(present):
+            fields = {field, *INSTEAD_OF.get(field or "", ())}
+            if field is None or not fields.isdisjoint(map(input_of, present)):
                 continue
             noun = "back fracture" if field == "back_fracture" else QUANTITIES[field].noun
             raise InputError(
@@ -393,7 +415,7 @@ def columns_in(
         match = None if text in ignore_columns else field_of(text)
         if text in ignore_columns:
             continue
-        if match is None:
+        if match is None or match.field in BY_PERIOD:
             if text in read:
                 columns[text] = Column(text)
             else:
@@ -402,7 +424,7 @@ def columns_in(
             continue
         name, unit, column = match
         field = QUANTITIES[name]
-        if name not in read:
+        if input_of(name) not in read:
             unused[text] = name
             continue
         key = "free_standing" if column == "free_standing" else name
@@ -451,6 +473,11 @@ def _reject_near_miss(text: str, source: object, read: Collection[str]) -> None:
     """Reject a header of five letters or more that is one edit or one swap away from a name."""
     bare = _IN_BRACKETS.sub("", text.strip().lower()).replace(" ", "_")
     end = _AT_THE_END.fullmatch(bare)
+    if "sa_g" in read and _LIKE_SPECTRAL.fullmatch(text.strip().lower()):
+        raise InputError(
+            f"{source}: unknown column {text[:60]!r}; did you mean a spectral acceleration? Name "
+            f"it by its period from {SHORTEST_S:g} to {LONGEST_S:g} s, such as 'sa(0.3)'"
+        )
     if bare in WRITTEN or sum(map(str.isalpha, bare)) < _FEWEST_LETTERS:
         return
     for name, field in _names().items():

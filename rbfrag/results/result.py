@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 class TextLine(NamedTuple):
-    """A labelled line of an answer: "Model     bounded-pgv_kr, …"; an empty label continues."""
+    """A labelled line of an answer: "Model     toppling-pgv, …"; an empty label continues."""
 
     label: str
     text: str

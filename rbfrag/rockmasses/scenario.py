@@ -179,7 +179,7 @@ def scenario(
 
     Args:
         measures: what is known of the motion, by name: pgv_m_s [m/s], pga_g [g], tm_s [s], pgd_m
-            [m], sa03_g, sa10_g, sa30_g [g].
+            [m], spectral accelerations such as sa(1) [g].
         model: as in :func:`rbfrag.question.question.predict`.
         db: database of the models.
         displacement_m: how far is too far for a block that slides [m]; None for an answer of

@@ -262,6 +262,14 @@ class DrawingAnswer(_Document):
     resultant_m: Pair
 
 
+class LossByInputs(_Document):
+    """Log losses of a model with these measures."""
+
+    reads: list[str]
+    log_loss: float | None
+    log_loss_kr05: float | None
+
+
 @keys_of(ModelRow, names=("name", "kind", "term", "method", "is_default", "created"))
 class ModelListed(_Document):
     """A stored model; the same JSON as `rbfrag models list`.
@@ -269,6 +277,7 @@ class ModelListed(_Document):
     `reads` names the measures of the shaking that it needs. `log_loss` is that of outcomes of
     earthquakes left out, the smaller the better among models of a kind; `log_loss_kr05` that of
     those of blocks of k_r >= 0.05 alone, null of blocks that are not known by it;
+    `losses_by_inputs` has both by the measures that are given, where they differ;
     `sensitive_share` is the share of the simulated outcomes behind it that a change of the motion
     by a millionth changes; null of kinds of which that is not asked.
     """
@@ -277,6 +286,7 @@ class ModelListed(_Document):
     n: int | None
     log_loss: float | None
     log_loss_kr05: float | None
+    losses_by_inputs: list[LossByInputs]
     events: int | None
     sensitive_share: float | None
     domain: dict[str, Pair]

@@ -311,7 +311,11 @@ def vocabulary_document() -> VocabularyDocument:
     """Return the quantities in the order of the help, and the intensity terms."""
     quantities = [_quantity(group, about) for group, members in GROUPS.items() for about in members]
     terms = [
-        TermDocument(name=name, measures=[*term.inputs], label=measures(term.inputs))
+        TermDocument(
+            name=name,
+            measures=[*term.inputs] or ["sa_g"],
+            label=measures(term.inputs) if term.inputs else "SA(T)",
+        )
         for name, term in TERMS.items()
     ]
     return VocabularyDocument(quantities=quantities, terms=terms)

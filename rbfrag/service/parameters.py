@@ -1,7 +1,7 @@
 """Parameters of the operations, in a query or a body, generated from the declared fields.
 
-A parameter has the name of the command line's option without its dashes, and the same unit;
-spectral accelerations are named as the columns of tables are. Values are read here as numbers and
+A parameter has the name of the command line's option without its dashes, and the same unit.
+Values are read here as numbers and
 texts; the packages below decide which can be used, with the same texts for every interface.
 """
 
@@ -38,6 +38,7 @@ from rbfrag.vocabulary.quantities import (
     parameter_of,
 )
 from rbfrag.vocabulary.quantity import Limits
+from rbfrag.vocabulary.spectral import SpectralSet
 
 T = TypeVar("T", bound=BaseModel)
 
@@ -50,7 +51,7 @@ PerCent = Annotated[str, Field(pattern=r"^[0-9.,]+ ?%$", max_length=20)]
 Column = StrictFloat | Annotated[list[StrictFloat | None], Field(min_length=1, fail_fast=True)]
 """A number that stands for every element, or a list of one an element, null where there is none."""
 
-COLUMNS = frozenset((*BLOCK, *MEASURED, *SHAKING, "cohesion_pa", "density_kg_m3"))
+COLUMNS = SpectralSet((*BLOCK, *MEASURED, *SHAKING, "cohesion_pa", "density_kg_m3"))
 """Fields of which many blocks have one each."""
 
 _TEXTS = frozenset((*SPACE, *COMPONENT, "drainage"))
@@ -91,7 +92,10 @@ def asking(
     for word, name in words.items():
         type_, default = INPUTS[name].type, _DEFAULTS.get(name)
         of: Any = bool
-        if type_ is bool:
+        if type_ is dict:
+            of = (dict[str, Column] if many else list[Text]) | None
+            default = None
+        elif type_ is bool:
             default = False
         elif type_ is str:
             of = Text | None
@@ -260,7 +264,7 @@ class HazardQuery(Parameters):
     years: Positive = 50.0
     """Period of the probability [years]."""
     imt: Text | None = None
-    """Intensity measure of the curve: PGV, PGA, SA(1.0)."""
+    """Intensity measure of the curve: PGV, PGA, SA(0.5)."""
     site: Text | None = None
     """Site of the file: its number from 1 on, or its name."""
     convert: Text | None = None

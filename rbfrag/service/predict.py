@@ -58,9 +58,13 @@ def answer_many(body: bytes, row_limit: int, db: str | None) -> bytes:
     import numpy as np
 
     rows = read_as(PredictRows, json_of(body))
-    if not any(isinstance(value, list) for _, value in rows):
+    values = {name: value for name, value in rows if not isinstance(value, dict)}
+    for name, by_period in rows:
+        if isinstance(by_period, dict):
+            values |= {f"{name} {period}": value for period, value in by_period.items()}
+    lengths = {name: len(value) for name, value in values.items() if isinstance(value, list)}
+    if not lengths:
         return json_text(answer_one(rows, db))
-    lengths = {name: len(value) for name, value in rows if isinstance(value, list)}
     for name, length in lengths.items():
         if length > row_limit:
             raise InputError(
@@ -110,7 +114,7 @@ def answer_table(body: bytes, query: TableQuery, row_limit: int, db: str | None)
         source.write_bytes(body)
         try:
             with opened_table(source, SHAKING, sheet=query.sheet, ignore_columns=ignored) as table:
-                if not {*SHAKING}.isdisjoint(table.header.columns):
+                if any(name in SHAKING for name in table.header.columns):
                     inputs = {name: v for name, v in inputs.items() if name in MEASURED}
             answer = predict_table(
                 source, target, inputs=inputs, kind=kind, sheet=query.sheet, ignore_columns=ignored,

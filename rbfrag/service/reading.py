@@ -21,7 +21,8 @@ from rbfrag.results.diagnostic import with_diagnostics
 from rbfrag.service.problem import BUSY, GONE, MalformedError, RequestRefusedError, rejection
 from rbfrag.service.settings import ServiceSettings
 from rbfrag.solver.kinds import FREE_STANDING
-from rbfrag.vocabulary.quantities import parameter_of
+from rbfrag.vocabulary.quantities import name_of, parameter_of
+from rbfrag.vocabulary.spectral import BY_PERIOD
 
 MULTIPART = "multipart/form-data"
 
@@ -274,11 +275,16 @@ def json_text(document: object) -> bytes:
     return _WRITER.dump_json(with_diagnostics(document))
 
 
-def query_of(request: Request) -> dict[str, str]:
-    """Return the parameters of a request; duplicate names are rejected."""
+def query_of(request: Request) -> dict[str, Any]:
+    """Return the parameters of a request; duplicate names are rejected, except of values by
+    oscillator period.
+    """
     query = request.scope["query_string"].decode("latin-1")
     pairs = parse_qsl(query, keep_blank_values=True)
-    values = dict(pairs)
+    values: dict[str, Any] = {}
+    for name, value in pairs:
+        values[name] = [*values.get(name, ()), value] if name_of(name) in BY_PERIOD else value
+    pairs = [pair for pair in pairs if name_of(pair[0]) not in BY_PERIOD]
     if len(values) < len(pairs):
         seen: set[str] = set()
         for name, _ in pairs:

@@ -82,8 +82,7 @@ def rock_mass(
     measures, how = query.question()
     if how and not measures:
         raise InputError(
-            f"{next(iter(how))} requires an intensity measure: give pgv, pga or sa10_g, or pgd "
-            "and tm"
+            f"{next(iter(how))} requires an intensity measure: give pgv, pga or sa, or pgd and tm"
         )
     question: dict[str, Any] = {**measures, **how, "db": db}
     answer = rockmass(described, n=query.n, seed=query.seed, **question)

@@ -6,6 +6,14 @@ One module, because each start of the program loads all of it.
 from __future__ import annotations
 
 from rbfrag.vocabulary.quantity import NOT_NEGATIVE, POSITIVE, Input, Limits, Measure, Quantity
+from rbfrag.vocabulary.spectral import (
+    BY_PERIOD,
+    SpectralMapping,
+    SpectralNames,
+    input_of,
+    period_of,
+    spectral_inputs,
+)
 
 TYPE_CHECKING = False  # that of `typing` would load it
 if TYPE_CHECKING:
@@ -54,18 +62,22 @@ def _stored_spectral(name: str, period_s: float) -> Quantity:
     return Quantity(name, label, "g", symbol, measure=Measure(period_s=period_s), stored=meaning)
 
 
-def _spectral(name: str, period_s: float, credible: float, rank: int = 0) -> Quantity:
-    imt, stored = f"SA({period_s:.1f})", _stored_spectral(name, period_s)
-    aliases = (name.partition("_")[0], imt.lower(), f"sa_{period_s:.1f}")
+def _spectral(name: str) -> Quantity:
+    """Return a spectral acceleration at any period, or the standard deviation of its logarithm."""
+    period_s = period_of(name.removesuffix("_sigma"))
+    assert period_s is not None
+    if name.endswith("_sigma"):
+        return _deviation(name, f"SA({period_s:g} s)")
+    largest = 10.0 if period_s < 3.0 else 5.0
     return Quantity(
-        name, stored.label, "g", stored.symbol, NOT_NEGATIVE, Input("5 % damping", aliases),
-        credible=(0.0, credible, "larger than ever recorded (it is in g): is it in g?"),
+        name, f"Spectral acceleration at {period_s:g} s", "g", f"SA({period_s:g} s)", NOT_NEGATIVE,
+        Input("5 % damping", (f"SA({period_s:g} s)",)),
+        credible=(0.0, largest, "larger than ever recorded (it is in g): is it in g?"),
         prompt=f"the spectral acceleration at {period_s:g} s and 5 % damping in g, 0 or more",
         measure=Measure(
-            axis=f"spectral acceleration, SA({period_s:.1f} s), 5 % damping", power=1,
-            period_s=period_s, imt=imt, rank=rank, uncertain=True, top=10.0, largest=10.0,
+            axis=f"spectral acceleration, SA({period_s:g} s), 5 % damping", power=1,
+            period_s=period_s, imt=f"SA({period_s})", uncertain=True, top=10.0, largest=10.0,
         ),
-        stored=stored.stored,
     )  # fmt: skip
 
 
@@ -229,14 +241,14 @@ GROUPS: dict[str, tuple[Quantity, ...]] = {
             Input(aliases=("pgv", "peak_ground_velocity")),
             credible=(0.0, 5.0, "larger than ever recorded (it is in m/s): did you mean cm/s?"),
             measure=Measure(axis="peak ground velocity, PGV", power=1, imt="PGV", imt_factor=0.01,
-            rank=1, uncertain=True, top=5.0, largest=20.0),
+            uncertain=True, top=5.0, largest=20.0),
             stored="peak ground velocity, extreme of the exact integral"),
         Quantity("pga_g", "Peak ground acceleration", "g", "PGA", NOT_NEGATIVE,
             Input(aliases=("pga", "peak_ground_acceleration")),
             credible=(
                 0.0, 5.0, "larger than ever recorded (it is in g): did you mean cm/s² or m/s²?",
             ),
-            measure=Measure(axis="peak ground acceleration, PGA", power=1, imt="PGA", rank=3,
+            measure=Measure(axis="peak ground acceleration, PGA", power=1, imt="PGA",
             uncertain=True, top=5.0, largest=10.0),
             stored="peak ground acceleration, max |a| over both signs"),
         Quantity("tm_s", "Mean period", "s", "T_m", POSITIVE, Input(aliases=("tm", "mean_period")),
@@ -250,9 +262,8 @@ GROUPS: dict[str, tuple[Quantity, ...]] = {
             credible=(0.0, 20.0, "larger than ever recorded (it is in m): did you mean cm?"),
             measure=Measure(axis="peak ground displacement, PGD", power=1),
             stored="peak ground displacement, extreme of the exact double integral"),
-        _spectral("sa03_g", 0.3, credible=10.0),
-        _spectral("sa10_g", 1.0, credible=10.0, rank=2),
-        _spectral("sa30_g", 3.0, credible=5.0),
+        Quantity("sa_g", "Spectral accelerations at oscillator periods T from 0.01 to 10 s", "g",
+            input=Input("5 % damping", column="sa(T)", type=dict)),
         Quantity(
             "arias_m_s", "Arias intensity", "m/s", "I_a", NOT_NEGATIVE, Input("π/(2g) ∫a² dt",
             ("arias", "ia", "arias_intensity")),
@@ -269,9 +280,8 @@ GROUPS: dict[str, tuple[Quantity, ...]] = {
     "scenario": (
         _deviation("pgv_sigma", "PGV"),
         _deviation("pga_sigma", "PGA"),
-        _deviation("sa03_sigma", "SA(0.3)"),
-        _deviation("sa10_sigma", "SA(1.0)"),
-        _deviation("sa30_sigma", "SA(3.0)"),
+        Quantity("sa_sigma", "Standard deviations of ln SA at oscillator periods T",
+            input=Input("about its median", column="sa(T)_sigma", type=dict)),
         Quantity("pgv_tau", "Between-event standard deviation of ln PGV",
             range=NOT_NEGATIVE,
             input=Input("part of {pgv_sigma}, for the prediction interval of {sites}"),
@@ -293,8 +303,6 @@ GROUPS: dict[str, tuple[Quantity, ...]] = {
             range=NOT_NEGATIVE, input=Input(), prompt=_SIGMA),
     ),
     "record": (
-        Quantity("sa_g", "Spectral accelerations by oscillator period in s", "g",
-            input=Input("such as {{1.0: 0.4}}")),
         Quantity("motion", "Accelerogram or its file",
             input=Input("instead of intensity measures")),
         Quantity(
@@ -385,8 +393,11 @@ GROUPS: dict[str, tuple[Quantity, ...]] = {
         Quantity("loss_sigma", "Standard deviation of the logarithm of the loss", input=Input()),
     ),
     "stored measures": (
+        _stored_spectral("sa03_g", 0.3),
         _stored_spectral("sa05_g", 0.5),
+        _stored_spectral("sa10_g", 1.0),
         _stored_spectral("sa20_g", 2.0),
+        _stored_spectral("sa30_g", 3.0),
         Quantity("cav_m_s", "Cumulative absolute velocity", "m/s", "CAV", measure=Measure(),
             stored=f"cumulative absolute velocity, integral of |a| (EPRI 1988); {_SAMPLES}"),
         Quantity("d5_95_s", "Significant duration", "s", "D_5-95", measure=Measure(),
@@ -424,14 +435,24 @@ GROUPS: dict[str, tuple[Quantity, ...]] = {
 }
 # fmt: on
 
-QUANTITIES = {quantity.name: quantity for group in GROUPS.values() for quantity in group}
-INPUTS = {name: q.input for name, q in QUANTITIES.items() if q.input is not None}
-MEASURES = {name: q.measure for name, q in QUANTITIES.items() if q.measure is not None}
-"""The quantities, those that can be given, and the intensity measures, by name."""
+QUANTITIES = SpectralMapping(
+    {quantity.name: quantity for group in GROUPS.values() for quantity in group},
+    _spectral, *BY_PERIOD,
+)  # fmt: skip
+INPUTS = SpectralMapping(
+    {name: q.input for name, q in QUANTITIES.items() if q.input is not None},
+    lambda name: _spectral(name).input, *BY_PERIOD,
+)  # fmt: skip
+MEASURES = SpectralMapping(
+    {name: q.measure for name, q in QUANTITIES.items() if q.measure is not None},
+    lambda name: _spectral(name).measure, "sa_g",
+)  # fmt: skip
+"""The quantities, those that can be given, and the intensity measures, by name; spectral
+accelerations at any period are made on demand."""
 
 
-def _names(*groups: str) -> tuple[str, ...]:
-    return tuple(quantity.name for group in groups for quantity in GROUPS[group])
+def _names(*groups: str) -> SpectralNames:
+    return SpectralNames(quantity.name for group in groups for quantity in GROUPS[group])
 
 
 NUMBERS = _names("numbers")
@@ -461,7 +482,7 @@ SCENE = _names("scenario")
 """How well measures are known, and what stands for them: the scenario and the site."""
 SCENARIO = frozenset({"rjb_km", "vs30_m_s", "amplification"})
 """What is turned into measures before a model is asked."""
-SHAKING = (*INTENSITY, *SCENE)
+SHAKING = SpectralNames((*INTENSITY, *SCENE))
 RECORD = _names("record")
 ANSWERING = _names("answering")
 """Which model answers, and how wide its interval is."""
@@ -479,7 +500,7 @@ ROW = (*_names("names"), "kind", *_names("rows"))
 """What a row of a table holds in addition to its block and its shaking."""
 _OF_ROWS = (*ROW, *SPACE, *BY_ROW, "mechanism", "drainage")
 COLUMNS = tuple(dict.fromkeys((*BLOCK, *MEASURED, *SHAKING, *COMPONENT, *_OF_ROWS)))
-"""What may be a column of a table."""
+"""What may be a column of a table; for ``sa_g`` and ``sa_sigma`` columns by period, ``sa(0.5)``."""
 
 PANELS = {
     "Block and shaking": ("height_m", "width_m", "beta_deg", "phi_deg", "kind", "pgv_m_s"),
@@ -492,13 +513,6 @@ PANELS = {
     "Model and confidence level": (*REQUEST, *INVERSE),
 }
 """Inputs by the headings of the help; an input belongs to the first group that holds it."""
-
-SPECTRAL = {
-    measure.period_s: name
-    for name, measure in MEASURES.items()
-    if measure.period_s is not None and name in INPUTS
-}
-"""Spectral accelerations (5 % damping, one component) that can be given, by period [s]."""
 
 OTHER_WORDS = {"dip": "beta_deg", "dip_sigma": "beta_sigma_deg"}
 """Further words for inputs, which shell and requests accept, too."""
@@ -532,13 +546,15 @@ def word_of(name: str) -> str:
 
 
 def option_of(name: str) -> str:
-    """Return the command-line option of an input."""
+    """Return the command-line option of an input; of a spectral acceleration with its period."""
+    if (of := input_of(name)) != name:
+        return f"{option_of(of)} {name.partition(')')[0].removeprefix('sa(')}"
     return "--" + word_of(name).replace("_", "-")
 
 
 def parameter_of(name: str) -> str:
-    """Return the request parameter of an input: spectral accelerations as in tables."""
-    return name if name in SPECTRAL.values() else word_of(name)
+    """Return the request parameter of an input."""
+    return word_of(name)
 
 
 _BY_WORD = {parameter_of(name): name for name in INPUTS} | {
@@ -564,7 +580,10 @@ def inputs_from(words: Mapping[str, Any]) -> dict[str, Any]:
     words_of: dict[str, str] = {}
     for word, value in words.items():
         name = name_of(word)
-        if value is None or (value is False and word != name):
+        if value is None or value == () or (value is False and word != name):
+            continue
+        if name in BY_PERIOD:
+            inputs |= spectral_inputs(name, value, word)
             continue
         if name in inputs:
             raise InputError(

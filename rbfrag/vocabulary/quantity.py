@@ -76,7 +76,8 @@ class Input:
         default: value or rule where it is not given, for the help.
         column: its column in tables that are written; empty for its name.
         word: its name in options and requests; empty for its name without the unit.
-        type: float, str, or bool for a truth value that is true by default.
+        type: float, str, bool for a truth value that is true by default, or dict for values by
+            oscillator period.
     """
 
     __slots__ = ("aliases", "column", "default", "detail", "type", "word")
@@ -105,14 +106,13 @@ class Measure:
         period_s: oscillator period of a spectral acceleration [s].
         imt: intensity measure type of OpenQuake; empty for none.
         imt_factor: unit of that type in the unit of the quantity.
-        rank: position by skill among the measures that a shipped model reads alone; 0 for none.
         uncertain: whether the standard deviation of its logarithm may be given.
         top: strongest shaking that fragility functions for other tools cover.
         largest: value beyond which the unit of a grid of shaking must be wrong.
     """
 
     __slots__ = (
-        "axis", "imt", "imt_factor", "largest", "period_s", "power", "rank", "title", "top",
+        "axis", "imt", "imt_factor", "largest", "period_s", "power", "title", "top",
         "uncertain",
     )  # fmt: skip
 
@@ -125,13 +125,12 @@ class Measure:
         period_s: float | None = None,
         imt: str = "",
         imt_factor: float = 1.0,
-        rank: int = 0,
         uncertain: bool = False,
         top: float | None = None,
         largest: float | None = None,
     ) -> None:
         self.title, self.axis, self.power, self.period_s = title, axis, power, period_s
-        self.imt, self.imt_factor, self.rank, self.uncertain = imt, imt_factor, rank, uncertain
+        self.imt, self.imt_factor, self.uncertain = imt, imt_factor, uncertain
         self.top, self.largest = top, largest
 
 

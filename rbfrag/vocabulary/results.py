@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from rbfrag.vocabulary.quantities import QUANTITIES
 from rbfrag.vocabulary.quantity import Quantity
+from rbfrag.vocabulary.spectral import BY_PERIOD, SpectralMapping
 
 _GROUPS: dict[str, tuple[tuple[str, ...], ...]] = {
     "Probability of failure": (
@@ -92,6 +93,7 @@ _GROUPS: dict[str, tuple[tuple[str, ...], ...]] = {
         ("events", "Number of earthquakes"),
         ("log_loss", "Log loss of held-out earthquakes; lower is better"),
         ("log_loss_kr05", "Log loss of held-out earthquakes for blocks with k_r ≥ 0.05"),
+        ("losses_by_inputs", "Log losses of held-out earthquakes by the measures that are given"),
         ("sensitive_share", "Fraction of outcomes that a change of the motion by 1e-6 alters"),
         ("domain", "Fitted range by variable"),
     ),
@@ -319,5 +321,8 @@ def _key(name: str, label: str, unit: str = "", symbol: str = "") -> Quantity:
 RESULT_GROUPS = {title: tuple(_key(*about) for about in rows) for title, rows in _GROUPS.items()}
 """Keys of the documents by subject."""
 
-RESULTS = QUANTITIES | {about.name: about for keys in RESULT_GROUPS.values() for about in keys}
+RESULTS = SpectralMapping(
+    {**QUANTITIES, **{about.name: about for keys in RESULT_GROUPS.values() for about in keys}},
+    QUANTITIES.__getitem__, *BY_PERIOD,
+)  # fmt: skip
 """All keys of the documents, by name."""

@@ -19,7 +19,7 @@ from rbfrag.fragility.joint_sampling import JointSampler
 LAW = Dependence(0.07, 0.18, 0.19, 0.56, 1.6, 3.8, 8.9, 1.40)
 
 
-@pytest.fixture(scope="module", params=["bounded-pgv_pga", "record-xp"])
+@pytest.fixture(scope="module", params=["toppling-pgv_pga:exact", "record-xp"])
 def study(request: pytest.FixtureRequest) -> Study:
     return Study.of(REFERENCE, request.param)
 

@@ -71,7 +71,7 @@ def test_it_needs_no_journal_and_holds_no_samples(built: Path) -> None:
     curves = raw.execute("SELECT count(displacement_m) FROM simulation").fetchone()
     maps = raw.execute("SELECT count(*) FROM outcome_interval").fetchone()
     raw.close()
-    assert dict(rows) == {"sliding": 4, "toppling": 36}
+    assert dict(rows) == {"rocking": 48, "sliding": 4, "toppling": 36}
     assert curves == (4 * 23,)
     assert maps == (0,)
     assert settings == [('{"search_limit":0.01}',)]

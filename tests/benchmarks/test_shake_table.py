@@ -14,6 +14,7 @@ import rbfrag
 from benchmarks import shake_table_runs as simulated
 from benchmarks.shake_table import (
     MEDIAN_RAD,
+    SHIPPED_MODELS,
     SIGMA_LN,
     Candidates,
     best_of,
@@ -25,7 +26,6 @@ from benchmarks.shake_table import (
     main,
     score,
     shipped_fragility,
-    shipped_models,
     weighted,
 )
 from benchmarks.shake_table_runs import ALPHA_RAD, P2, RESTITUTION, overturned, read, run_blocks
@@ -101,8 +101,8 @@ def test_tables_come_out_and_outcomes_are_kept(
 
 def test_the_shipped_fragility_is_asked_for_each_block(folder: Path) -> None:
     trials = read(folder)
-    row = next(row for row in shipped_models() if row.term == "pgv_pga")
-    probabilities = shipped_fragility(trials, row, [0.75, None])
+    model = SHIPPED_MODELS["rocking-pga with PGV"]
+    probabilities = shipped_fragility(trials, *model, [0.75, None])
     number, test = MEDIAN_RAD.size + 7, 5
     assert probabilities.p.shape == (2 * MEDIAN_RAD.size, len(trials.motions))
     motion, alpha = trials.motions[test], MEDIAN_RAD[7]
@@ -110,7 +110,7 @@ def test_the_shipped_fragility_is_asked_for_each_block(folder: Path) -> None:
         assert probabilities.settings[k][0] == alpha
         answer = rbfrag.predict(
             kind="rocking", p2=P2, kr=math.tan(alpha), restitution=e,
-            pgv_m_s=motion.pgv_m_s, pga_g=motion.pga_g, model=row,
+            pgv_m_s=motion.pgv_m_s, pga_g=motion.pga_g, model=model[0],
         )  # fmt: skip
         assert probabilities.p[k, test] == pytest.approx(answer.probability, rel=1e-12)
     assert probabilities.settings[7][2] == 0.75

@@ -74,7 +74,7 @@ def test_without_a_database_the_reference_answers_and_says_so(shell: Shell) -> N
     assert 0.0 < answer["ci_low"] < answer["probability"] < answer["ci_high"] < 1.0
     assert answer["in_domain"]
     more = shell.json("predict", "--p2", "3", "--kr", "0.1", "--pgv", "0.6", "--pga", "0.5")
-    assert (answer["term"], more["term"]) == ("pgv_kr", "pgv_pga")
+    assert (answer["term"], more["term"]) == ("pgv", "pgv_pga")
 
 
 def test_file_that_is_no_database(rejects: Rejects, tmp_path: Path) -> None:

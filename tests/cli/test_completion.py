@@ -40,7 +40,7 @@ def test_models_and_motions(shell: Shell, tmp_path: Path) -> None:
     assert offered("rbfrag motions show --db own.db ") == ["1", "2", "3"]
     assert offered("rbfrag respond --db own.db 2") == ["2"]
     assert offered("rbfrag respond --db nowhere.db 2") == []
-    assert "bounded-pgv_kr" in offered("rbfrag models show bounded-p")  # those that are shipped
+    assert "toppling-pgv_pga" in offered("rbfrag models show toppling-p")  # those that are shipped
 
 
 def test_options_that_help_does_not_show_are_offered_too() -> None:

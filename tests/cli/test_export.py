@@ -15,7 +15,7 @@ from rbfrag.db.models import save_model
 from rbfrag.errors import InputError
 from rbfrag.exchange.nrml import read_nrml
 from rbfrag.exchange.pelicun_table import read_pelicun
-from tests.cli.conftest import Rejects, Shell
+from tests.cli.conftest import Shell
 from tests.fragility.conftest import model_row
 from tests.hazards.conftest import measure_row
 
@@ -27,7 +27,7 @@ def database(shell: Shell) -> None:
     with opened_database("rbfrag.db", create=True) as engine, engine.begin() as connection:
         save_model(connection, model_row())
         save_model(connection, measure_row("pga"))
-        save_model(connection, measure_row("sa10"))
+        save_model(connection, measure_row("sa"))
 
 
 @pytest.mark.usefixtures("database")
@@ -95,7 +95,7 @@ def test_nrml_of_a_spectral_acceleration(shell: Shell) -> None:
         document = shell.json(
             "export", "nrml", "--p2", "3", "--kr", "0.1", "--imt", imt, "--out", "a.xml"
         )
-        assert document["term"] == "sa10"
+        assert document["term"] == "sa"
     (parsed,) = read_nrml("a.xml")
     assert (parsed.kind.measure, parsed.kind.period_s) == ("sa_g", 1.0)
     x = np.linspace(0.2, 2.0, 50)
@@ -191,8 +191,7 @@ def test_pelicun_has_a_description_beside_the_table(shell: Shell) -> None:
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        (("--p2", "3", "--kr", "0.1", "--imt", "SA(3)"), "use one of PGV, PGA, SA(1)"),
-        (("--p2", "3", "--kr", "0.1", "--imt", "SA(0.5)"), "use one of PGV, PGA, SA(1)"),
+        (("--p2", "3", "--kr", "0.1", "--imt", "SA(30)"), "SA(30)"),
         (("--p2", "3", "--kr", "0.1", "--imt", "PGD"), "intensity measure 'PGD' is unknown"),
         (("--p2", "3", "--kr", "0.1", "--levels", "2"), "at least 10"),
         (
@@ -219,9 +218,11 @@ def test_the_suffix_is_checked_first(rejects: Callable[..., str]) -> None:
     )
 
 
-def test_the_measures_that_work_are_named_and_no_others(rejects: Rejects) -> None:
-    for imt in ("SA(0.3)", "SA(2.0)", "SA(3.0)"):
-        message = rejects(
-            "export", "nrml", "--p2", "3", "--kr", "0.1", "--imt", imt, "--out", "a.xml"
-        )
-        assert message.endswith(f"{imt}: no model uses it alone: use one of PGV, PGA, SA(1)")
+def test_spectral_accelerations_of_any_period_are_exported(shell: Shell) -> None:
+    for imt, period_s in (("SA(0.3)", 0.3), ("SA(2.0)", 2.0), ("SA(3)", 3.0)):
+        shell("export", "nrml", "--p2", "3", "--kr", "0.1", "--imt", imt, "--out", "a.xml")
+        (parsed,) = read_nrml("a.xml")
+        assert (parsed.kind.measure, parsed.kind.period_s) == ("sa_g", period_s)
+        x = np.geomspace(0.05, 3.0, 30)
+        expected = rbfrag.predict(3.0, 0.1, sa_g={period_s: x}).probability
+        assert np.abs(parsed.at(x) - expected).max() < 1e-4

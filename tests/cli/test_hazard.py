@@ -12,6 +12,7 @@ import pytest
 
 import rbfrag
 from rbfrag.db.engine import opened_database
+from rbfrag.db.location import REFERENCE
 from rbfrag.db.models import save_model
 from rbfrag.hazards.hazard_rates import merge_similar_warnings
 from rbfrag.results.numbers import annual_rate, place, return_period
@@ -316,13 +317,10 @@ def test_plot(shell: Shell, curve: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "options", "words"),
     [
-        ("sa(0.5)_g,annual_rate\n0.1,0.01\n0.5,0.001\n", (),
-         "no model uses SA(0.5) alone: give a curve of one of PGV, SA(1), PGA, or"
-         " turn it into PGV with --convert bommer_alarcon_2006"),
-        ("sa(0.75)_g,annual_rate\n0.1,0.01\n0.5,0.001\n", (),
-         "no model uses SA(0.75) alone: give a curve of one of PGV, SA(1), PGA"),
+        ("sa(0.5)_g,annual_rate\n0.1,0.01\n0.5,0.001\n", ("--model", "wls-pgv"),
+         "model 'wls-pgv' requires --pgv"),
         ("pga_g,annual_rate\n0.1,0.01\n0.5,0.001\n", (),
-         "PGA alone is biased; give a curve of PGV or SA(1.0), or the --disaggregation by"),
+         "PGA alone is biased; give a curve of PGV or SA, or the --disaggregation by"),
         ("pgv_m_s,annual_rate\n0.1,0.01\n0.5,0.001\n", ("--convert-sigma", "0.5"),
          "--convert-sigma requires --convert"),
         ("sa(1)_g,annual_rate\n0.1,0.01\n0.5,0.001\n",
@@ -424,3 +422,21 @@ def test_several_blocks_without_a_site_are_rejected(rejects: Rejects, logic_tree
     mean = logic_tree / "hazard_curve-mean-PGV_7.csv"
     message = rejects("hazard", mean, "--blocks", "blocks.csv")
     assert "2 of 2 blocks have no site" in message
+
+
+def test_curves_of_several_measures_are_no_branches(rejects: Rejects) -> None:
+    Path("sa.csv").write_text("sa(0.5)_g,annual_rate\n0.1,0.01\n0.5,0.001\n")
+    Path("pgv.csv").write_text("pgv_m_s,annual_rate\n0.1,0.01\n0.5,0.001\n")
+    block = ("--p2", "3", "--kr", "0.1", "--db", REFERENCE)
+    for order in (("sa.csv", "pgv.csv"), ("pgv.csv", "sa.csv")):
+        message = rejects("hazard", *order, "--weights", "0.5,0.5", *block)
+        assert "the curves are of PGV and SA(0.5): give curves of one measure" in message
+
+
+def test_a_rate_of_pga_names_a_model_of_the_kind(rejects: Rejects, shell: Shell) -> None:
+    Path("pga.csv").write_text("pga_g,annual_rate\n0.1,0.01\n0.5,0.001\n")
+    block = ("--p2", "3", "--kr", "0.1", "--db", REFERENCE)
+    for kind, model in (("toppling", "toppling-pga"), ("rocking", "rocking-pga")):
+        message = rejects("hazard", "pga.csv", *block, "--kind", kind)
+        assert f"accept the bias with --model {model}" in message
+        shell("hazard", "pga.csv", *block, "--kind", kind, "--model", model)

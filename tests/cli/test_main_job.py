@@ -112,9 +112,9 @@ def test_from_files_to_a_probability(shell: Shell, tmp_path: Path) -> None:
     answer = shell.json("predict", "--p2", "3", "--kr", "0.1", "--pgv", "0.3")
     assert set(answer) == PREDICT_KEYS
     assert 0.0 <= answer["ci_low"] <= answer["probability"] <= answer["ci_high"] <= 1.0
-    assert answer["model"] == "logistic-pgv"
+    assert answer["model"] == "toppling-pgv"
     assert shell.json("models", "list")[0]["is_default"] is True
-    assert shell.json("models", "show", "logistic-pgv")["coefficients"] == report["coefficients"]
+    assert shell.json("models", "show", "toppling-pgv")["coefficients"] == report["coefficients"]
     assert shell.json("db", "info")["rows"]["combination"] == 24
     (row,) = shell.json("db", "info", "--by", "suite")["suites"]
     assert (row["suite"], row["kind"], row["combinations"]) == ("made-up", "toppling", 24)

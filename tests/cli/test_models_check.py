@@ -7,8 +7,10 @@ import sqlite3
 from contextlib import closing
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+import rbfrag
 from rbfrag.db.engine import opened_database
 from rbfrag.db.insert import update_rows
 from rbfrag.db.location import REFERENCE
@@ -30,16 +32,15 @@ def change(database: Path, statement: str) -> None:
 def test_data_as_they_were(shell: Shell, database: Path) -> None:
     answer = shell.json("models", "check")
     values = {item["name"]: item for item in answer}
-    assert values["bounded-pgv_pga"] == {
-        "name": "bounded-pgv_pga", "state": "unchanged", "remark": ""
+    assert values["toppling-pgv_pga"] == {
+        "name": "toppling-pgv_pga", "state": "unchanged", "remark": ""
     }  # fmt: skip
-    # of blocks that slump or stand free the reference has the models alone
+    # of blocks that slump or topple confined the reference has the models alone
     without = {name for name, item in values.items() if item["state"] != "unchanged"}
     assert without
     assert {name.partition("-")[0] for name in without} == {
         "confined_toppling",
         "slumping",
-        "rocking",
     }
     assert {values[name]["state"] for name in without} == {"no data"}
     headline, *lines = shell("models", "check").stdout.splitlines()
@@ -66,13 +67,13 @@ def test_a_value_that_is_gone_is_counted(shell: Shell, database: Path) -> None:
         "y_m_s = NULL, lower = NULL WHERE id = (SELECT min(id) FROM combination WHERE "
         "status = 'found' AND kind = 'toppling' AND vertical_motion_id IS NULL)",
     )
-    assert "fitted to 8579 critical values, 8578 today" in shell("models", "check", expect=1).stdout
+    assert "fitted to 8622 critical values, 8621 today" in shell("models", "check", expect=1).stdout
 
 
 def test_a_model_that_cannot_be_read_is_told(shell: Shell, database: Path) -> None:
     # as a later rbfrag would have stored it, with its digest
     with opened_database(database) as engine, engine.begin() as connection:
-        single = fragility_model.c.name == "bounded-pgv_kr"
+        single = fragility_model.c.name == "toppling-pgv"
         update_rows(connection, fragility_model, single, {"method": "guess"})
     output = shell("models", "check", expect=1).stdout
     assert "unreadable" in output
@@ -87,22 +88,34 @@ def test_models_are_listed_where_none_is_named(shell: Shell) -> None:
     assert shell.json("models", "show") == shell.json("models", "list")
 
 
-def test_a_campaign_of_two_sizes_ends_in_one_sentence(
+def test_a_campaign_of_one_size_ends_in_one_sentence(
     shell: Shell, rejects: Rejects, tmp_path: Path
 ) -> None:
     shell("motions", "add", write_suite(tmp_path / "records"))
+    shell("simulate", "--p2", "10", "--jobs", "1")
+    message = rejects("fit", "--term", "pgv", "--method", "toppling")
+    assert "do not identify the 5 parameters of method toppling" in message
+
+
+def test_stronger_blocks_fail_less_often_by_any_fit(shell: Shell, tmp_path: Path) -> None:
+    shell("motions", "add", write_suite(tmp_path / "records"))
     shell("simulate", "--p2", "10,1", "--jobs", "1")
-    message = rejects("fit", "--term", "pga", "--method", "bounded")
-    assert "do not identify the 5 parameters of method bounded" in message
+    report = shell.json("fit", "--term", "pgv", "--method", "toppling")
+    assert report["coefficients"]["b_ln_v"] == 0.02
+    assert "b_ln_v is held at 0.02" in " ".join(report["warnings"])
+    kr = np.geomspace(0.001, 0.3, 200)
+    for p2 in (10.0, 1.0):
+        p = rbfrag.predict(p2, kr, pgv_m_s=0.5).probability
+        assert (np.diff(p) <= 0.0).all()
 
 
 def test_a_default_is_chosen_in_a_copy_of_the_built_in_data(
     shell: Shell, rejects: Rejects, tmp_path: Path
 ) -> None:
-    message = rejects("models", "default", "logistic-sa10")
+    message = rejects("models", "default", "logistic-pgd_tm")
     assert "copy" in message
     assert str(REFERENCE) in message
     shutil.copy(REFERENCE, tmp_path / "rbfrag.db")
-    shell("models", "default", "logistic-sa10")
+    shell("models", "default", "logistic-pgd_tm")
     defaults = [item["name"] for item in shell.json("models", "list") if item["is_default"]]
-    assert "logistic-sa10" in defaults
+    assert "logistic-pgd_tm" in defaults

@@ -53,8 +53,8 @@ def test_a_curve_runs_over_what_is_named(shell: Shell, rejects: Rejects, tmp_pat
     shell("plot", "curve", *block, "--over", "pga", "--pgv", "0.6")
     text = path.read_text(encoding="utf-8")
     assert "peak ground acceleration, PGA [g]" in text
-    assert "PGV = 0.6 m/s" in text
-    assert "over = cav: use pgv, pga, pgd, sa10" in rejects(
+    assert "PGV 0.6 m/s" in text
+    assert "over = cav: use pgv, pga, pgd or sa(1)" in rejects(
         "plot", "curve", *block, "--over", "cav"
     )
     assert "pgv_m_s is the axis of the curve" in rejects("plot", "curve", *block, "--pgv", "0.6")
@@ -67,7 +67,7 @@ def test_a_curve_of_a_free_standing_block(shell: Shell, rejects: Rejects, tmp_pa
         ("--kind", "rocking", "--restitution", "0.9"), ("--restitution", "0.9"), ("--no-back",),
     ):  # fmt: skip
         process = shell("plot", "curve", *shape, *more)
-        assert "model PGV, rocking" in path.read_text(encoding="utf-8")
+        assert "model rocking-pgv" in path.read_text(encoding="utf-8")
         assert "no plane backs the block" not in process.stdout
     message = rejects("plot", "curve", *shape, "--kind", "toppling", "--restitution", "0.9")
     assert "restitution cannot be combined with kind toppling" in message
@@ -83,11 +83,11 @@ def test_curves_of_blocks_that_slide_and_slump(
     assert "slides too far" in path.read_text(encoding="utf-8")
     shell(*drawn, "--height", "2.5", "--width", "2.5", "--dip", "20", "--phi", "32",
           "--displacement", "0.1", "--pga", "0.5")  # fmt: skip
-    assert "model PGV, PGA, sliding" in path.read_text(encoding="utf-8")
+    assert "model sliding-pgv_pga" in path.read_text(encoding="utf-8")
     shell(*drawn, "--ks", "0.2", "--ps2", "3", "--pga", "0.5")
     assert "the block slumps" in path.read_text(encoding="utf-8")
-    message = rejects(*drawn, "--ky", "0.2", "--displacement", "0.1", "--over", "sa10")
-    assert "no stored sliding model works with sa10_g" in message
+    message = rejects(*drawn, "--ky", "0.2", "--displacement", "0.1", "--over", "sa(1)")
+    assert "no stored sliding model works with sa(1)" in message
 
 
 def test_yield_over_rotation(shell: Shell, rejects: Rejects, tmp_path: Path) -> None:

@@ -68,7 +68,7 @@ def test_a_slump_is_answered_as_from_python(shell: Shell, block: Path) -> None:
         (("--kind", "sliding", "--displacement", "0.1", *MOTION), "--ky is missing"),
         (
             ("--kind", "sliding", "--ky", "0.1", "--displacement", "0.1"),
-            "no intensity measure is given: a prediction requires --pgv, or --sa10",
+            "no intensity measure is given: a prediction requires --pga, or --pgv, or --sa",
         ),
         (("--kind", "slumping", "--ks", "0.1", *MOTION), "--ps2 is missing"),
         (
@@ -165,5 +165,5 @@ def test_a_block_that_fails_at_rest_is_said_to(shell: Shell, rejects: Rejects) -
 
 
 def test_a_rejection_of_measures_names_options(rejects: Rejects) -> None:
-    message = rejects("predict", "--p2", "3", "--kr", "0.1", "--kind", "rocking", "--pga", "0.5")
-    assert "works with --pga: give --pga and --magnitude, or --pgv, or --sa10" in message
+    message = rejects("predict", "--p2", "3", "--kr", "0.1", "--kind", "rocking", "--tm", "0.5")
+    assert "--tm is given: a prediction requires --pga, or --pgv, or --sa" in message

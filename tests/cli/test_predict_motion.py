@@ -1,4 +1,4 @@
-"""`rbfrag predict --motion` from the shell: a file, a stored record, what is not known of it."""
+"""`rbfrag predict --motion` from the shell: a file, a stored record, what is not measures of it."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import pytest
 
 import rbfrag
 from rbfrag.db.location import REFERENCE
+from rbfrag.vocabulary.spectral import SPECTRUM_PERIODS_S
 from tests.cli.conftest import Rejects, Shell
 
 BLOCK = ("--p2", "3", "--kr", "0.05")
@@ -45,6 +46,23 @@ def test_the_shell_has_the_bits_of_python(shell: Shell, record: Path) -> None:
     forward = shell.json("predict", *BLOCK, "--motion", record, "--polarity", "forward")
     values = spectrum if isinstance(spectrum, dict) else spectrum[0]
     assert forward["intensity_m_s"] == pytest.approx(values["x_m_s"][0], rel=1e-12)
+
+
+def test_a_model_that_does_not_read_the_toppling_spectrum_reads_the_response_spectrum(
+    record: Path,
+) -> None:
+    motion = rbfrag.read_motions(record)[0]
+    measures = {"pga_g": motion.pga_g, "pgv_m_s": motion.pgv_m_s}
+    measures["sa_g"] = dict(zip(SPECTRUM_PERIODS_S, motion.spectrum_g, strict=True))
+    for options in ({"kind": "rocking"}, {"model": "toppling-pgv_pga"}):
+        kr = 0.3 * motion.pga_g
+        answer = rbfrag.predict(3.0, kr, motion=motion, db=REFERENCE, **options)
+        exact = rbfrag.predict(3.0, kr, **measures, db=REFERENCE, **options)
+        assert (answer.model, answer.probability) == (exact.model, exact.probability)
+        bare = {name: measures[name] for name in ("pga_g", "pgv_m_s")}
+        uncertain = rbfrag.predict(3.0, kr, **bare, db=REFERENCE, **options)
+        assert 0.0 < answer.probability < 1.0
+        assert answer.probability != uncertain.probability
 
 
 def test_a_stored_record_by_its_number(shell: Shell, record: Path, tmp_path: Path) -> None:

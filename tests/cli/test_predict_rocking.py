@@ -13,7 +13,7 @@ from rbfrag.db.models import save_model
 from rbfrag.question.question import predict
 from rbfrag.solver.block.geometry import Block
 from tests.cli.conftest import Rejects, Shell
-from tests.fragility.test_overturning import T2, stored
+from tests.fragility.test_rocking_models import PGA, stored
 
 MOTION = ("--pgv", "0.6", "--pga", "0.5", "--db", "own.db")
 COMMAND = ("predict", "--kind", "rocking")
@@ -22,7 +22,7 @@ COMMAND = ("predict", "--kind", "rocking")
 @pytest.fixture(autouse=True)
 def database(shell: Shell) -> None:
     with opened_database("own.db", create=True) as engine, engine.begin() as connection:
-        save_model(connection, stored("pgv_pga", T2).row)
+        save_model(connection, stored("pga", PGA).row)
 
 
 def test_numbers_are_answered_as_from_python(shell: Shell) -> None:

@@ -25,7 +25,7 @@ def test_a_rock_mass_is_answered_as_by_the_shell(shell: Shell, tmp_path: Path) -
     assert answer.as_dict() == shell.json("rockmass", MASS, *command)
     assert len(answer.to_frame()) == 2 * 60
     answer = rbfrag.rockmass(str(MASS), n=60, pgv_m_s=0.6, sa_g={1.0: 0.4})
-    command = ["--n", "60", "--pgv", "0.6", "--sa10", "0.4"]
+    command = ["--n", "60", "--pgv", "0.6", "--sa", "1=0.4"]
     assert answer.as_dict() == shell.json("rockmass", MASS, *command)
     with pytest.raises(rbfrag.InputError, match="motion cannot be combined with pgv_m_s"):
         rbfrag.rockmass(MASS, pgv_m_s=0.6, motion=record)

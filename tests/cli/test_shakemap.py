@@ -273,7 +273,7 @@ def test_free_standing_blocks_with_their_restitution(
     document = shell.json("shakemap", grid, *single, *free_standing)
     first = json.loads(Path("b.geojson").read_text())["features"][0]["properties"]
     assert first["probability"] == pytest.approx(float(rows[1]["probability"]), rel=1e-9)
-    assert document["model"] == "rocking-pgv_pga"
+    assert document["model"] == "rocking-pga"
     message = rejects("shakemap", grid, *single, *SINGLE, "--kind", "toppling")
     assert "--restitution cannot be combined with kind toppling" in message
 

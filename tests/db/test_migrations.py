@@ -28,12 +28,14 @@ from rbfrag.db.connect import unchecked_engine
 from rbfrag.db.engine import migrate, open_database, opened_database, upgrade_database
 from rbfrag.db.insert import renew_digests
 from rbfrag.db.location import REFERENCE, REVISIONS, SCHEMA_REVISION, VERSION_TABLE
+from rbfrag.db.models import save_model
 from rbfrag.db.motions import add_motion
 from rbfrag.db.rows import EarthquakeInfo
 from rbfrag.db.schema import SITE_COLUMNS, ledger, metadata
 from rbfrag.db.views import drop_views, views
 from rbfrag.errors import SchemaVersionError
 from rbfrag.motions.ground_motion import GroundMotion
+from tests.fragility.conftest import model_row
 
 
 def _config() -> Config:
@@ -174,7 +176,7 @@ def test_an_older_database_is_upgraded(place: str, older: Engine, tmp_path: Path
     message = f"has schema {SCHEMA_REVISION}, this rbfrag requires {LATER}"
     with pytest.raises(SchemaVersionError, match=message):
         open_database(place)
-    assert upgrade_database(place) == (SCHEMA_REVISION, LATER)
+    assert upgrade_database(place)[:2] == (SCHEMA_REVISION, LATER)
     direct = create_engine(f"sqlite:///{tmp_path / 'direct.db'}")
     metadata.create_all(direct)
     ledger.create(direct)
@@ -252,6 +254,8 @@ def first_release(
                         batch.drop_constraint(f"ck_{name}_{column}", type_="check")
                     batch.drop_column(column)
             renew_digests(connection, Table(name, MetaData(), autoload_with=connection))
+        with operations.batch_alter_table("fragility_model") as batch:
+            batch.drop_column("completions")
         connection.execute(text("UPDATE motion SET samples = NULL WHERE component = 'X'"))
         motion_table = Table("motion", MetaData(), autoload_with=connection)
         renew_digests(connection, motion_table)
@@ -267,7 +271,7 @@ def test_the_first_release_is_upgraded(
     place: str, first_release: tuple[Engine, dict[str, Any]], tmp_path: Path
 ) -> None:
     engine, before = first_release
-    assert upgrade_database(place) == ("0001", SCHEMA_REVISION)
+    assert upgrade_database(place) == ("0001", SCHEMA_REVISION, ())
     direct = create_engine(f"sqlite:///{tmp_path / 'direct.db'}")
     metadata.create_all(direct)
     ledger.create(direct)
@@ -289,9 +293,24 @@ def test_the_first_release_is_upgraded(
     assert (after["motion"][3].housner_m, after["motion"][3].d5_75_s) == (None, None)
 
 
+def test_models_that_an_upgrade_deletes_are_named(
+    place: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with opened_database(place, create=True) as engine, engine.begin() as connection:
+        save_model(connection, model_row())
+        connection.execute(text(f"UPDATE {VERSION_TABLE} SET version_num = '0003'"))
+
+    def delete_models(engine: Engine) -> None:
+        with engine.begin() as connection:
+            connection.execute(text("DELETE FROM fragility_model"))
+
+    monkeypatch.setattr("rbfrag.db.engine.migrate", delete_models)
+    assert upgrade_database(place) == ("0003", SCHEMA_REVISION, (model_row().name,))
+
+
 def test_upgrade_of_a_current_database_changes_nothing(place: str) -> None:
     open_database(place, create=True).dispose()
-    assert upgrade_database(place) == (SCHEMA_REVISION, SCHEMA_REVISION)
+    assert upgrade_database(place) == (SCHEMA_REVISION, SCHEMA_REVISION, ())
 
 
 def test_upgrade_prints_nothing(place: str, capfd: pytest.CaptureFixture[str]) -> None:

@@ -52,7 +52,7 @@ def test_version_3(formats_dir: Path) -> None:
     assert parsed.std_ln["pga_g"][0] == 0.49
     assert list(parsed.std_ln) == ["pga_g"]
     # PSA03 1.63, PSA10 2.7, PSA30 0.7 percent of g
-    sa = [parsed.measures[name][0] for name in ("sa03_g", "sa10_g", "sa30_g")]
+    sa = [parsed.measures[name][0] for name in ("sa(0.3)", "sa(1)", "sa(3)")]
     assert sa == pytest.approx([0.0163, 0.027, 0.007])
     assert parsed.warnings == ()
 
@@ -148,11 +148,14 @@ def test_suspicious_units_are_doubted(grid_file: Path) -> None:
 def test_a_grid_without_pgv(grid_file: Path) -> None:
     grid_file.write_text(GRID.replace('name="PGV" units="cm/s"', 'name="PSA10" units="pctg"'))
     parsed = read_shakemap(grid_file)
-    assert list(parsed.measures) == ["pga_g", "sa10_g"]
-    assert parsed.measures["sa10_g"].tolist() == pytest.approx([0.1, 0.2, 0.4, 0.1, 0.2, 0.4])
+    assert list(parsed.measures) == ["pga_g", "sa(1)"]
+    assert parsed.measures["sa(1)"].tolist() == pytest.approx([0.1, 0.2, 0.4, 0.1, 0.2, 0.4])
+    for title in ("PSA06", "SA(0.6)"):
+        grid_file.write_text(GRID.replace('name="PGV" units="cm/s"', f'name="{title}" units="g"'))
+        assert list(read_shakemap(grid_file).measures) == ["pga_g", "sa(0.6)"]
     nothing = GRID.replace('"PGV"', '"MMI"').replace('"PGA"', '"SVEL"')
     grid_file.write_text(nothing)
-    with pytest.raises(InputError, match="no field PGV or PGA or PSA03 or PSA10 or PSA30"):
+    with pytest.raises(InputError, match="no field PGV or PGA or PSA10"):
         read_shakemap(grid_file)
 
 
@@ -163,7 +166,7 @@ def test_deviations_of_spectral_accelerations(tmp_path: Path, grid_file: Path) -
             UNCERTAINTY.replace('"STDPGV" units="ln(cm/s)"', f'"STDPSA10" units="{unit}"')
         )
         parsed = read_shakemap(grid_file, uncertainty=other)
-        assert parsed.std_ln["sa10_g"].tolist() == [0.5, 0.6, 0.7, 0.5, 0.6, 0.7]
+        assert parsed.std_ln["sa(1)"].tolist() == [0.5, 0.6, 0.7, 0.5, 0.6, 0.7]
 
 
 @pytest.mark.parametrize("name", ["shake_result.hdf", "SHAKE.HDF5"])

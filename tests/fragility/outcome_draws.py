@@ -5,10 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from rbfrag.db.rows import CombinationTable
+from rbfrag.fragility.fit.completions import spectral_velocities
 from rbfrag.fragility.fit.data import Y0_OVER_PGV, FitSource, kr_over_pga_of_grid
 from rbfrag.fragility.method import arrays
 from rbfrag.fragility.methods import method_named
 from rbfrag.solver.results import NUMERICS_VERSION
+from rbfrag.vocabulary.spectral import SPECTRUM_PERIODS_S
 from tests.synthetic import unknown_measures
 
 G = 9.80665
@@ -50,10 +52,13 @@ def drawn_outcomes(
     # a spectrum that bends towards PGA as those of records do
     xp = pgv * np.exp(random.normal(-0.2, 0.2, motion.size))
     xp = xp / (1.0 + p * xp / (pga * G))
-    x = {"pgv": pgv, "pgv_pga": pgv, "pgv_pga_tm": pgv, "xp": xp}[term]
+    x = {"pgv": pgv, "pgv_pga": pgv, "xp": xp}[term]
+    spectra = drawn_spectra(random, pga, tm)
     y0 = pgv[:, None] * Y0_OVER_PGV
     fitted = method_named(method)
-    columns = {"p": p, "intensity_m_s": x, "pga_g": pga, "tm_s": tm}
+    columns = {"p": p, "intensity_m_s": x, "pga_g": pga, "pgv_m_s": pgv, "tm_s": tm}
+    if (velocity := fitted.forms[term].velocity) is not None:
+        columns["velocity_m_s"] = spectral_velocities(velocity, spectra, p)
     values = {name: column[:, None] for name, column in columns.items()}
     values |= {"y_m_s": y0, "kr": y0 * p[:, None] / G}
     form = fitted.forms[term]
@@ -94,12 +99,21 @@ def drawn_outcomes(
         numerics_version=np.full(n, NUMERICS_VERSION, dtype=object),
         measures=unknown_measures(n),
     )
-    return FitSource(table, xp, kr_over_pga_of_grid(p2, pgv, pga), topples)
+    return FitSource(
+        table, xp, kr_over_pga_of_grid(p2, pgv, pga), topples, recording=motion, spectra=spectra
+    )
+
+
+def drawn_spectra(random: np.random.Generator, pga: np.ndarray, tm: np.ndarray) -> np.ndarray:
+    """Return response spectra [g] that rise to the mean period and then fall, shape (n, 21)."""
+    x = np.array(SPECTRUM_PERIODS_S) / tm[:, None]
+    noise = np.cumsum(random.normal(0.0, 0.08, x.shape), axis=1)
+    return np.asarray(pga[:, None] * 2.5 * x / (0.4 + x * x * x) ** (2.0 / 3.0) * np.exp(noise))
 
 
 TRUTH = {
     ("logistic", "pgv"): (-2.0, 4.8),
-    ("bounded", "pgv_pga"): (3.1, 1.9, 4.7, 2.7, 2.5),
-    ("record", "xp"): (4.1, 3.2, 1.3),
+    ("toppling", "pgv_pga"): (2.4, 0.6, 2.3, 4.5, 1.0, 2.1),
+    ("record", "xp"): (2.2, 1.6, 0.7),
 }
 """Parameters near those of the recorded motions."""

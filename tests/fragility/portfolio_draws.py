@@ -22,9 +22,10 @@ SHARED = {"rho_e": 0.136, "rho_s": 0.236, "rho_v": 0.219, "rho_o": 0.409,
 def anywhere(n: int, seed: int) -> Placement:
     """Return blocks of two earthquakes, three sites and two components, on both sides."""
     random = np.random.default_rng(seed)
-    return Placement(
-        random.uniform(-1.2, 1.7, n), random.normal(size=n), random.integers(2, size=n),
-        random.integers(3, size=n), random.integers(2, size=n), random.choice((-1, 1), size=n),
+    return Placement.of(
+        random.uniform(-1.2, 1.7, n), random.normal(size=n), earthquake=random.integers(2, size=n),
+        site=random.integers(3, size=n), component=random.integers(2, size=n),
+        polarity=random.choice((-1, 1), size=n),
     )  # fmt: skip
 
 

@@ -28,7 +28,10 @@ def simulated(earthquakes: int, sites: int = 2, seed: int = 0) -> dict[str, Any]
         part.ravel() for part in np.meshgrid(*axes, indexing="ij")
     )
     y = np.exp(0.35 * (step - 1.5))
-    blocks = Placement(0.5 * np.log(p2), np.log(y), event, site, component, polarity)
+    blocks = Placement.of(
+        0.5 * np.log(p2), np.log(y), earthquake=event, site=site, component=component,
+        polarity=polarity,
+    )  # fmt: skip
     p = ndtr(-1.2 * np.log(y))
     z = JointSampler(TRUE, blocks).normals(1, random)[0]
     return {

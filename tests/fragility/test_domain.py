@@ -14,6 +14,7 @@ from rbfrag.db.location import REFERENCE
 from rbfrag.db.model_file import ModelRow
 from rbfrag.errors import ModelError
 from rbfrag.exchange.database_tables import read_table
+from rbfrag.fragility.completion import Regression, encode_regressions
 from rbfrag.fragility.domain import RATIOS, ratios_of
 from rbfrag.fragility.fit.data import FitData, fit_data
 from rbfrag.fragility.fit.fitting import fit_source, joint_scatter
@@ -21,14 +22,15 @@ from rbfrag.fragility.measures import TERMS
 from rbfrag.fragility.method import SINGLE
 from rbfrag.fragility.methods import method_named
 from rbfrag.fragility.model import FragilityModel
-from rbfrag.fragility.prediction import Prediction
+from rbfrag.fragility.prediction import Prediction, answer_given
 from rbfrag.fragility.prediction_array import PredictionArray
 from rbfrag.question.components import SINGLE_ASSUMED
 from rbfrag.question.question import predict
+from rbfrag.vocabulary.spectral import SPECTRUM_PERIODS_S, spectral_name
 from tests.fragility.outcome_draws import drawn_outcomes
 
-METHOD, TERM = method_named("bounded"), TERMS["pgv_pga_tm"]
-TRUE = (2.9, 2.3, 4.3, 2.6, 1.6, 1.3)
+METHOD, TERM = method_named("toppling"), TERMS["pgv_pga"]
+TRUE = (2.4, 0.6, 2.3, 4.5, 1.0, 2.1)
 
 REFERENCE_DOMAIN = {
     "p2": (0.1, 30.0),
@@ -48,7 +50,7 @@ def given_by_issue() -> dict[str, float]:
 
 @pytest.fixture(scope="module")
 def source() -> Any:
-    return drawn_outcomes("bounded", "pgv_pga_tm", TRUE, events=20, motions=3)
+    return drawn_outcomes("toppling", "pgv_pga", TRUE, events=20, motions=3)
 
 
 @pytest.fixture(scope="module")
@@ -72,36 +74,55 @@ def domain_sentences(answer: Prediction) -> list[str]:
 
 
 def columns_of(data: FitData) -> dict[str, np.ndarray]:
+    names = ("p2", "kr", "pgv_m_s", "pga_g", "velocity_m_s")
+    return {name: data.grid(name)[data.read] for name in names}
+
+
+def exact(data: FitData, source: Any) -> dict[str, np.ndarray]:
+    """Return the blocks of a fit with the whole spectrum of their motions."""
+    columns = {name: value for name, value in columns_of(data).items() if name != "velocity_m_s"}
+    row = np.nonzero(data.read)[0]
+    spectra = source.spectra[data.combination][row].T
+    return columns | dict(zip(map(spectral_name, SPECTRUM_PERIODS_S), spectra, strict=True))
+
+
+def measured_columns(data: FitData) -> dict[str, np.ndarray]:
+    """Return the blocks of a fit with PGV, PGA and Tm alone."""
     names = ("p2", "kr", "pgv_m_s", "pga_g", "tm_s")
     return {name: data.grid(name)[data.read] for name in names}
 
 
 def many(model: FragilityModel, columns: dict[str, np.ndarray]) -> PredictionArray:
-    answer = predict(**columns, model=model)
+    answer = answer_given(model, columns, 0.95)
     assert isinstance(answer, PredictionArray)
     return answer
 
 
-def test_points_of_the_fit_are_in_the_domain(fitted: FragilityModel, data: FitData) -> None:
-    columns = columns_of(data)
+def test_points_of_the_fit_are_in_the_domain(
+    fitted: FragilityModel, data: FitData, source: Any
+) -> None:
+    columns = exact(data, source)
     answer = many(fitted, columns)
     allowed = (columns["kr"] < columns["pga_g"]) & (answer.y_m_s < 2.0 * columns["pgv_m_s"])
-    assert 0.9949 <= answer.in_domain[allowed].mean() < 1.0
-    values = {text for text in answer.reason[allowed] if text}
-    assert values == {
-        "the combination of p2, kr, pgv_m_s, pga_g and tm_s is farther from the centre of the "
-        "fitted data than 99.5 % of them: the answer is an extrapolation"
+    # of the ratio of PGV to PGA 99.5 % are in its range, too
+    assert 0.989 <= answer.in_domain[allowed].mean() < 1.0
+    values = {text.split(" is ")[0] for text in answer.reason[allowed] if text}
+    assert values <= {
+        "the combination of p2, kr, pgv_m_s, pga_g and the spectral velocity",
+        "PGV",
     }
 
 
 def test_contradictory_measures_are_named() -> None:
-    form = METHOD.forms["pgv_pga_tm"]
+    form = METHOD.forms["pgv_pga"]
+    regression = Regression([[0.3, -0.1, -0.02, 0.5]] * 6, [0.2] * 6, [[0.2, 0.5]] * 6)
     size = len(form.parameters)
     row = ModelRow(
-        name="bounded-pgv_pga_tm", term="pgv_pga_tm", method="bounded",
+        name="toppling-pgv_pga", term="pgv_pga", method="toppling",
         coefficients=dict(zip(form.parameters, TRUE, strict=True)),
         covariance=tuple(tuple(0.01 * (i == j) for j in range(size)) for i in range(size)),
         domain=REFERENCE_DOMAIN, data_fingerprint="f",
+        completions=encode_regressions({"pgv_m_s pga_g tm_s": regression}),
     )  # fmt: skip
     answer = predict_block(row, **given_by_issue())
     assert not answer.in_domain
@@ -141,7 +162,7 @@ def test_measures_that_the_model_does_not_read_are_judged_too(model: FragilityMo
 def test_scaling_pgv_alone_leaves_the_domain(
     fitted: FragilityModel, data: FitData, i: int, factor: float
 ) -> None:
-    columns = columns_of(data)
+    columns = measured_columns(data)
     block_inputs = {name: float(v[i % v.size]) for name, v in columns.items()}
     block_inputs["kr"] = min(block_inputs["kr"], 0.5 * block_inputs["pga_g"])
     answer = predict_block(fitted, **{**block_inputs, "pgv_m_s": block_inputs["pgv_m_s"] * factor})
@@ -159,7 +180,8 @@ def test_arrays_agree_with_scalars(fitted: FragilityModel, data: FitData) -> Non
     random, n = np.random.default_rng(7), 300
     rows = random.integers(0, int(data.read.sum()), n)
     columns = {
-        name: v[rows] * np.exp(random.normal(0.0, 0.7, n)) for name, v in columns_of(data).items()
+        name: v[rows] * np.exp(random.normal(0.0, 0.7, n))
+        for name, v in measured_columns(data).items()
     }
     answer = many(fitted, columns)
     assert 20 < answer.in_domain.sum() < n - 20
@@ -173,7 +195,7 @@ def test_arrays_agree_with_scalars(fitted: FragilityModel, data: FitData) -> Non
 
 
 def test_a_single_block_under_many_motions(fitted: FragilityModel, data: FitData) -> None:
-    columns = columns_of(data)
+    columns = measured_columns(data)
     motions = {name: columns[name][:50] for name in ("pgv_m_s", "pga_g", "tm_s")}
     held = predict(3.0, 0.01, **motions, model=fitted)
     full = predict(np.full(50, 3.0), np.full(50, 0.01), **motions, model=fitted)
@@ -221,8 +243,7 @@ def test_z_is_judged_only_where_its_range_says_more(model: FragilityModel) -> No
 
 def test_ratios_do_not_change_with_the_scale_of_the_motion() -> None:
     values = {
-        "pgv_m_s": 0.3, "pga_g": 0.4, "tm_s": 0.5, "pgd_m": 0.1, "p": 1.7, "sa03_g": 0.8,
-        "sa10_g": 0.4, "sa30_g": 0.1,
+        "pgv_m_s": 0.3, "pga_g": 0.4, "tm_s": 0.5, "pgd_m": 0.1, "p": 1.7, "velocity_m_s": 0.3,
     }  # fmt: skip
     motion = [name for name in values if name not in ("tm_s", "p")]
     twice = {**values, **{name: 2.0 * values[name] for name in motion}}

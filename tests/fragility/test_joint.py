@@ -53,6 +53,9 @@ def test_limits_of_the_excess() -> None:
     p, q = np.array([0.0, 1.0, 0.3, 0.3]), np.array([0.4, 0.2, 0.0, 0.6])
     a, b = ndtri(p), ndtri(q)
     np.testing.assert_allclose(joint_excess(a, b, 1.0), np.minimum(p, q) - p * q, atol=1e-15)
+    beyond = np.nextafter(1.0, 2.0)  # a sum that was rounded up
+    for sign in (-1.0, 1.0):
+        assert np.array_equal(joint_excess(a, b, sign * beyond), joint_excess(a, b, sign))
     np.testing.assert_allclose(joint_excess(a, b, 0.0), 0.0, atol=1e-15)
     least = np.maximum(p + q - 1.0, 0.0) - p * q
     np.testing.assert_allclose(joint_excess(a, b, -1.0), least, atol=1e-15)

@@ -40,7 +40,7 @@ def test_the_default_answers_when_it_can(database):
         (["pgv_m_s"], "wls-pgv"),
         (["pgd_m", "tm_s"], "wls-pgd_tm"),
         (["pga_g", "tm_s"], "wls-pga_tm"),
-        (["pgv_m_s", "pga_g", "tm_s"], "wls-pga_tm"),  # without scores, what reads more
+        (["pgv_m_s", "pga_g", "tm_s"], "wls-pgv"),
     ],
 )
 def test_otherwise_the_best_that_the_measures_suffice_for(database, measures, name):
@@ -72,7 +72,7 @@ def test_measures_that_no_stored_model_works_with(database):
     with pytest.raises(InputError, match=r"no stored .* works with pga_g: give pga_g and tm_s"):
         predict(3, 0.1, pga_g=0.4, db=path)
     with pytest.raises(
-        InputError, match=r"tm_s is given: a prediction requires pgv_m_s, or sa10_g"
+        InputError, match=r"tm_s is given: a prediction requires pga_g, or pgv_m_s, or sa"
     ):
         predict(3, 0.1, tm_s=0.4, db=path)
 
@@ -125,7 +125,7 @@ def test_the_reference_named_as_a_database_is_no_stopgap(tmp_path, monkeypatch):
     monkeypatch.delenv("RBFRAG_DB", raising=False)
     for _ in range(2):
         assert predict(3.0, 0.1, pgv_m_s=0.6).data == SHIPPED
-        answer = predict(3.0, 0.1, pgv_m_s=0.6, db=REFERENCE, component="single")
+        answer = predict(3.0, 0.1, pgv_m_s=0.6, pga_g=0.5, db=REFERENCE, component="single")
         assert answer.warnings == ()
 
 
@@ -165,14 +165,14 @@ def scored(tmp_path, row):
 @pytest.mark.parametrize(
     ("default", "measures", "name"),
     [
-        (None, ["pgv_m_s", "pga_g", "tm_s"], "wls-pga_tm"),
+        (None, ["pgv_m_s", "pga_g", "tm_s"], "wls-pgv"),
         (None, ["pgv_m_s"], "wls-pgv"),
         (None, ["pga_g", "tm_s"], "wls-pga_tm"),
-        ("pgv", ["pgv_m_s", "pga_g", "tm_s"], "wls-pgv"),
-        ("pgv", ["pga_g", "tm_s"], "wls-pga_tm"),
+        ("pga_tm", ["pgv_m_s", "pga_g", "tm_s"], "wls-pga_tm"),
+        ("pga_tm", ["pgv_m_s"], "wls-pgv"),
     ],
 )
-def test_the_best_score_answers_unless_another_was_chosen(scored, default, measures, name):
+def test_the_order_of_terms_answers_unless_another_was_chosen(scored, default, measures, name):
     path = scored({"pgv": 0.20, "pga_tm": 0.15, "pgd_tm": 0.4}, default)
     for _ in range(2):
         assert find_model(None, measures, path).name == name
@@ -196,40 +196,28 @@ def test_a_worse_model_that_is_not_known_here_hides_no_better_one(tmp_path, row)
         predict(3.0, 0.1, pgv_m_s=0.6, db=path, model="newer")
 
 
-def test_of_models_without_scores_the_better_method_answers(tmp_path):
-    names = ("wls-pgv", "bounded-pgv_kr")
+def test_methods_that_are_compared_answer_where_no_other_does(tmp_path):
+    names = ("wls-pgv", "toppling-pgv")
     rows = [replace(item, diagnostics={}) for item in stored_rows(REFERENCE) if item.name in names]
     assert len(rows) == len(names)
     result = find_model(None, ["p2", "kr", "pgv_m_s"], stored(tmp_path / "unscored.db", rows))
-    assert result.name == "bounded-pgv_kr"
+    assert result.name == "toppling-pgv"
 
 
-def test_the_score_is_that_of_real_blocks_where_there_is_one(scored, tmp_path, row):
-    path = scored({"pgv": 0.20, "pga_tm": 0.15})
-    single = row("pgv")
-    scores = {"log_loss_held_out": 0.20, "log_loss_held_out_kr05": 0.10}
-    with opened_database(path) as engine, engine.begin() as connection:
-        save_model(
-            connection, replace(single, diagnostics={**single.diagnostics, "scores": scores}),
-            replace=True,
-        )  # fmt: skip
-    assert find_model(None, ["pgv_m_s", "pga_g", "tm_s"], path).name == "wls-pgv"
-
-
-def test_the_first_fitted_is_no_default_by_being_first(scored):
-    path = scored({"pgv": 0.20, "pga_tm": 0.15})
-    assert [row.name for row in stored_rows(path) if row.is_default] == ["wls-pga_tm"]
+def test_the_first_of_the_order_is_the_default(scored):
+    path = scored({"pga_tm": 0.15, "pgv": 0.20})
+    assert [row.name for row in stored_rows(path) if row.is_default] == ["wls-pgv"]
     with opened_database(path, read_only=True) as engine, engine.connect() as connection:
-        assert load_model(connection).name == "wls-pga_tm"
+        assert load_model(connection).name == "wls-pgv"
 
 
 def test_the_number_of_a_model_without_critical_values_is_that_of_its_outcomes():
     rows = {row.name: row for row in stored_rows(REFERENCE)}
     listed = {row["name"]: row["n"] for row in ModelList([*rows.values()]).rows()}
-    rocking, toppling = (rows[name].diagnostics for name in ("rocking-pgv_pga", "bounded-pgv_pga"))
+    rocking, toppling = (rows[name].diagnostics for name in ("rocking-pga", "toppling-pgv_pga"))
     assert rocking["n"] == 0
-    assert listed["rocking-pgv_pga"] == rocking["n_outcomes"]
-    assert listed["bounded-pgv_pga"] == toppling["n"] < toppling["n_outcomes"]
+    assert listed["rocking-pga"] == rocking["n_outcomes"]
+    assert listed["toppling-pgv_pga"] == toppling["n"] < toppling["n_outcomes"]
 
 
 def test_a_model_of_another_form_is_rejected(row, tmp_path):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -10,12 +11,14 @@ from numpy.typing import NDArray
 
 from rbfrag.db.location import REFERENCE
 from rbfrag.db.model_file import ModelRow
+from rbfrag.fragility.fit.completions import PERIOD_SETS_S, stored_inputs
 from rbfrag.fragility.fit.data import KR
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.fragility.model_selection import stored_rows
 from rbfrag.fragility.prediction import answer_given
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2 as G
 from rbfrag.solver.results import FloatArray
+from rbfrag.vocabulary.spectral import spectral_name
 
 ROWS = stored_rows(REFERENCE)
 N, STEPS = 400, 160
@@ -30,7 +33,14 @@ def model(request: pytest.FixtureRequest) -> FragilityModel:
     return FragilityModel.from_row(row)
 
 
-def questions(model: FragilityModel, seed: int = 5) -> dict[str, FloatArray]:
+def given_sets(model: FragilityModel) -> list[tuple[str, ...]]:
+    """Return the sets of measures that a model may be asked with."""
+    if model.form.velocity is None:
+        return [model.term.inputs]
+    return [*stored_inputs(model.term, model.form.velocity)]
+
+
+def questions(model: FragilityModel, names: Sequence[str], seed: int = 5) -> dict[str, FloatArray]:
     """Return blocks and motions of every sort, shape (n, 1)."""
     random = np.random.default_rng(seed)
 
@@ -47,10 +57,11 @@ def questions(model: FragilityModel, seed: int = 5) -> dict[str, FloatArray]:
         "pga_g": pga, "pgv_m_s": pgv, "tm_s": period, "magnitude": random.uniform(5.0, 8.0, (N, 1)),
         "pgd_m": pgv * period / 6.0 * between(1.2, 6.0), "xp_m_s": pgv * between(0.4, 1.6),
         "arias_m_s": pgv * pgv * between(2.0, 60.0),
-        "sa03_g": pga * between(0.5, 4.0), "sa10_g": pga * between(0.1, 3.0),
-        "sa30_g": pga * between(0.02, 1.0),
     }  # fmt: skip
-    return {name: values[name] for name in (*model.method.block.names, *model.term.inputs)}
+    for period_s in sorted({period_s for periods in PERIOD_SETS_S for period_s in periods}):
+        shape = 2.5 / (1.0 + (period_s / period) ** 2) + 0.1
+        values[spectral_name(period_s)] = pga * shape * between(0.5, 2.0)
+    return {name: values[name] for name in (*model.method.block.names, *names)}
 
 
 def p_of(model: FragilityModel, inputs: dict[str, FloatArray]) -> FloatArray:
@@ -63,27 +74,28 @@ def p_of(model: FragilityModel, inputs: dict[str, FloatArray]) -> FloatArray:
 
 
 def test_it_rises_with_all_measures_together(model: FragilityModel) -> None:
-    arguments = questions(model)
     factor = np.geomspace(1e-4, 100.0, STEPS)
-    for name in model.term.inputs:
-        if name not in FIXED:
-            arguments[name] = arguments[name] * factor ** (2.0 if name == "arias_m_s" else 1.0)
-    p = p_of(model, arguments)
-    assert np.diff(p, axis=1).min() >= -ROUNDING
-    assert p[:, 0].max() < 1e-3
-    assert np.median(p[:, -1]) > 0.7
+    for names in given_sets(model):
+        arguments = questions(model, names)
+        for name in names:
+            if name not in FIXED:
+                arguments[name] = arguments[name] * factor ** (2.0 if name == "arias_m_s" else 1.0)
+        p = p_of(model, arguments)
+        assert np.diff(p, axis=1).min() >= -ROUNDING, names
+        assert p[:, 0].max() < 1e-3
+        assert np.median(p[:, -1]) > 0.7
 
 
 def test_it_falls_with_strength(model: FragilityModel) -> None:
-    inputs = questions(model)
-    name = model.method.block.strength
-    inputs[name] = np.geomspace(*KR, STEPS)[None, :]
-    assert np.diff(p_of(model, inputs), axis=1).max() <= ROUNDING
+    for names in given_sets(model):
+        inputs = questions(model, names)
+        inputs[model.method.block.strength] = np.geomspace(*KR, STEPS)[None, :]
+        assert np.diff(p_of(model, inputs), axis=1).max() <= ROUNDING, names
 
 
 @pytest.mark.parametrize("name", [row.name for row in ROWS if row.kind == "sliding"])
 def test_it_falls_with_displacement(name: str) -> None:
     model = FragilityModel.from_row(next(row for row in ROWS if row.name == name))
-    inputs = questions(model)
+    inputs = questions(model, model.term.inputs)
     inputs["displacement_m"] = np.geomspace(1e-3, 10.0, STEPS)[None, :]
     assert np.diff(p_of(model, inputs), axis=1).max() <= ROUNDING

@@ -22,7 +22,7 @@ from rbfrag.fragility.prediction_array import PredictionArray
 from rbfrag.question.document import answer_numbers
 from rbfrag.question.question import predict
 from rbfrag.solver.scatter import fraction
-from tests.fragility.test_overturning import T2, predict_block, stored
+from tests.fragility.test_rocking_models import PGA, predict_block, stored
 
 G = 9.80665
 
@@ -125,7 +125,7 @@ def test_a_restitution_is_normal_between_0_and_1() -> None:
 
 
 def test_rocking_blocks_of_uncertain_strength_size_and_restitution() -> None:
-    model = stored("pgv_pga", T2)
+    model = stored("pga", PGA)
     question = {"p2": 3.0, "kr": 0.2, "restitution": 0.85, "pgv_m_s": 0.6, "pga_g": 0.5}
     answer = predict_block(model, **question, kr_sigma=0.2, p2_sigma=0.1, restitution_sigma=0.05)
     draws = 200_000
@@ -142,7 +142,7 @@ def test_rocking_blocks_of_uncertain_strength_size_and_restitution() -> None:
 
 
 def test_without_a_stated_restitution_each_block_has_its_own() -> None:
-    model = stored("pgv_pga", T2)
+    model = stored("pga", PGA)
     question = {"p2": 3.0, "kr": 0.3, "pgv_m_s": 0.9, "pga_g": 0.7}
     z = np.linspace(-8.0, 8.0, 4001)
     weight = np.exp(-0.5 * z * z) / np.exp(-0.5 * z * z).sum()
@@ -229,7 +229,7 @@ def test_what_is_no_uncertainty_is_rejected(inputs: dict[str, Any], words: str) 
 def test_a_sigma_without_its_value_is_rejected() -> None:
     with pytest.raises(InputError, match="restitution_sigma requires restitution"):
         predict_block(
-            stored("pgv_pga", T2), p2=3.0, kr=0.2, pgv_m_s=0.6, pga_g=0.5, restitution_sigma=0.1
+            stored("pga", PGA), p2=3.0, kr=0.2, pgv_m_s=0.6, pga_g=0.5, restitution_sigma=0.1
         )
 
 
@@ -258,7 +258,7 @@ def test_other_models_are_asked_of_the_uncertain_block_too():
         **{"pgv_m_s": 0.194, "pga_g": 0.212, "tm_s": 0.984},
     }
     document = answer_numbers(question, db=REFERENCE).as_dict()
-    assert len(document["answers"]) > 3
+    assert len(document["answers"]) == 3
     for answer in document["answers"]:
         alone = predict(**question, db=REFERENCE, model=answer["model"])
         assert answer["probability"] == alone.probability

@@ -11,6 +11,7 @@ import pytest
 from scipy.integrate import quad
 
 from rbfrag.errors import InputError
+from rbfrag.fragility.dependence import normal_quantile
 from rbfrag.fragility.model_selection import find_model
 from rbfrag.fragility.prediction import Prediction, answer_given
 from rbfrag.hazards.curve import HazardCurve, hazard_curve
@@ -21,9 +22,9 @@ from tests.hazards.conftest import measure_row
 K, B = 1e-4, 2.0
 
 CURVES: dict[str, tuple[str, float | None, str]] = {
-    "pgv_kr": ("pgv_m_s", None, "pgv_m_s"),
+    "pgv": ("pgv_m_s", None, "pgv_m_s"),
     "pga": ("pga_g", None, "pga_g"),
-    "sa10": ("sa_g", 1.0, "sa10_g"),
+    "sa": ("sa_g", 1.0, "sa(1)"),
 }
 
 
@@ -42,7 +43,7 @@ def probability(model: Any, measure: str, level: float) -> float:
 @pytest.mark.parametrize("term", CURVES)
 def test_each_measure_is_answered_by_its_own_model(measures_db: str, term: str) -> None:
     measure, period, name = CURVES[term]
-    model = "bounded-pga" if term == "pga" else None
+    model = "toppling-pga" if term == "pga" else None
     about: dict[str, Any] = {"component": "single", "db": measures_db, "model": model}
     answer = hazard(power_law(measure, period), 3.0, 0.1, **about)
     assert answer.tau == (None if term == "pga" else 0.15)
@@ -59,17 +60,14 @@ def test_each_measure_is_answered_by_its_own_model(measures_db: str, term: str) 
     assert answer.ci_low[0] < answer.annual_rate[0] < answer.ci_high[0]
 
 
-def test_a_logistic_fragility_on_a_power_law(measures_db: str) -> None:
-    # P = 1/(1 + (m/x)^s):  λ_f = K m^-B (π B/s)/sin(π B/s)
-    row = measure_row("sa10")
-    scores = []
-    for level in (0.2, 0.8):
-        p = probability(row, "sa10_g", level)
-        scores.append(math.log(p / (1.0 - p)))
-    s = (scores[1] - scores[0]) / math.log(4.0)
-    median = 0.2 * math.exp(-scores[0] / s)
+def test_a_lognormal_fragility_on_a_power_law(measures_db: str) -> None:
+    # P = Φ(ln(x/m)/β):  λ_f = K m^-B exp(B² β²/2)
+    row = measure_row("sa")
+    scores = [normal_quantile(probability(row, "sa(1)", level)) for level in (0.2, 0.8)]
+    beta = math.log(4.0) / (scores[1] - scores[0])
+    median = 0.2 * math.exp(-scores[0] * beta)
     answer = hazard(power_law("sa_g", 1.0), 3.0, 0.1, component="single", db=measures_db)
-    expected = K * median**-B * (math.pi * B / s) / math.sin(math.pi * B / s)
+    expected = K * median**-B * math.exp(0.5 * (B * beta) ** 2)
     assert answer.annual_rate[0] == pytest.approx(expected, rel=1e-4)
 
 
@@ -88,7 +86,7 @@ def test_the_scatter_of_a_conversion_is_integrated(
     # PGV = factor x exp(spread ξ): the rates of PGV are those of x times factor^B exp(B² spread²/2)
     expected = of_pgv.annual_rate[0] * used.factor**B * math.exp(0.5 * (B * spread) ** 2)
     assert answer.annual_rate[0] == pytest.approx(expected, rel=2e-3)
-    assert answer.term == "pgv_kr"
+    assert answer.term == "pgv"
     assert any(f"σ_ln {spread:g}, integrated" in text for text in answer.warnings)
 
 
@@ -103,10 +101,10 @@ def test_one_class_of_blocks(measures_db: str) -> None:
 
 def test_a_measure_that_knows_little_is_said(measures_db: str) -> None:
     inputs: dict[str, Any] = {"component": "single", "db": measures_db}
-    words = "PGA alone is biased; give a curve of PGV .* accept the bias with model bounded-pga"
+    words = "PGA alone is biased; give a curve of PGV .* accept the bias with model toppling-pga"
     with pytest.raises(InputError, match=words):
         hazard(power_law("pga_g", None), 3.0, 0.1, **inputs)
-    document = hazard(power_law("pga_g", None), 3.0, 0.1, model="bounded-pga", **inputs).warnings
+    document = hazard(power_law("pga_g", None), 3.0, 0.1, model="toppling-pga", **inputs).warnings
     assert any("PGA alone is biased" in text for text in document)
     assert any("PGA alone predicts" in text for text in document)
     quiet = hazard(power_law("sa_g", 1.0), 3.0, 0.1, **inputs).warnings
@@ -114,16 +112,18 @@ def test_a_measure_that_knows_little_is_said(measures_db: str) -> None:
 
 
 @pytest.mark.parametrize("period", [0.1, 0.5, 0.75, 1.5, 5.0])
-def test_no_other_period_is_answered(measures_db: str, period: float) -> None:
-    listed = r"one of PGV, SA\(1\), PGA"
-    with pytest.raises(
-        InputError, match=rf"no model uses SA\({period:g}\) alone: .*{listed}"
-    ) as caught:
-        hazard(power_law("sa_g", period), 3.0, 0.1, db=measures_db)
-    assert ("bommer_alarcon_2006" in str(caught.value)) is (period == 0.5)
+def test_any_period_is_answered(period: float) -> None:
+    answer = hazard(power_law("sa_g", period), 3.0, 0.1, component="single")
+    assert (answer.term, answer.model) == ("sa", "toppling-sa")
+    assert 0.0 < answer.annual_rate[0] < 1.0
 
 
-@pytest.mark.parametrize("model", ["bounded-pga_sa10", "bounded-pgv_kr"])
+def test_no_other_period_is_answered(measures_db: str) -> None:
+    with pytest.raises(InputError, match=r"no model uses SA\(20\): give a curve of one of PGV, SA"):
+        hazard(power_law("sa_g", 20.0), 3.0, 0.1, db=measures_db)
+
+
+@pytest.mark.parametrize("model", ["toppling-pgv_pga", "toppling-pgv"])
 def test_a_model_that_reads_more_is_rejected(measures_db: str, model: str) -> None:
     with pytest.raises(InputError, match="requires"):
         hazard(power_law("pga_g", None), 3.0, 0.1, model=model, db=measures_db)

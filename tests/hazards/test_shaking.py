@@ -91,7 +91,7 @@ def test_pga_alone_is_no_rate_unless_its_model_is_named(folder: Path) -> None:
     }  # fmt: skip
     with pytest.raises(InputError, match="PGA alone is biased"):
         losses(None, blocks, **about)
-    forced = losses(None, blocks, model="bounded-pga", **about)
+    forced = losses(None, blocks, model="toppling-pga", **about)
     assert forced.as_dict()["between_measures"] is None
     assert any("PGA alone is biased" in text for text in forced.warnings)
 
@@ -104,5 +104,5 @@ def test_the_best_measure_of_a_job_answers(folder: Path, tmp_path: Path) -> None
     about: dict[str, Any] = {"component": "rotd50", "expected": True}
     chosen = losses(folder, blocks, files={"gmf_data": without}, **about)
     inputs = losses(folder, blocks, imt=("SA(1.0)",), **about)
-    assert chosen.portfolio.measures == ("sa10_g",)
+    assert chosen.portfolio.measures == ("sa(1)",)
     assert chosen.block_rates[0].tolist() == inputs.block_rates[0].tolist()

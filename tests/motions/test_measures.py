@@ -12,7 +12,8 @@ from scipy.optimize import brentq
 
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.readers import read_motion
-from rbfrag.motions.response_spectrum import HOUSNER_PERIODS_S, SPECTRUM_PERIODS_S
+from rbfrag.motions.response_spectrum import HOUSNER_PERIODS_S
+from rbfrag.vocabulary.spectral import SPECTRUM_PERIODS_S
 
 G = 9.80665
 

@@ -16,8 +16,8 @@ from rbfrag.errors import InputError, MotionFileError
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.polarity import driving_acceleration_g
 from rbfrag.motions.readers import export_motions, read_horizontals
-from rbfrag.motions.response_spectrum import SPECTRUM_PERIODS_S
 from rbfrag.motions.rotation import rotate, rotate_into_slope, rotd
+from rbfrag.vocabulary.spectral import SPECTRUM_PERIODS_S
 
 G = 9.80665
 

@@ -10,6 +10,7 @@ import pytest
 from rbfrag.errors import InputError
 from rbfrag.fragility import describe
 from rbfrag.fragility.model import FragilityModel
+from rbfrag.plots import plot
 from rbfrag.plots.curve import plot_curve
 from rbfrag.question.question import predict
 from tests.fragility.portfolio_draws import SHARED
@@ -60,7 +61,46 @@ def test_other_measures_are_held(tmp_path, figures) -> None:
     plot_curve(straight_line_model("pga_tm"), BLOCK, tmp_path / "c.png", fixed={"tm_s": 0.5})
     axes = figures[0].axes[0]
     assert axes.get_xlabel() == "peak ground acceleration, PGA [g]"
-    assert "$T_m$ = 0.5 s" in axes.get_title()
+    assert "; Tm 0.5 s" in axes.get_title()
+
+
+@pytest.mark.parametrize(
+    ("over", "shaking", "model"),
+    [
+        ("pgv", {"pga_g": 0.4, "sa_g": {0.3: 0.9, 1.0: 0.5}}, "toppling-pgv_pga"),
+        ("pga", {"tm_s": 0.5}, "toppling-pga"),
+        ("sa(1)", {"sa_g": {0.3: 0.9}}, "toppling-sa"),
+        ("sa(1)", {"pga_g": 0.4, "kind": "rocking"}, "rocking-pga"),
+    ],
+)
+def test_curves_over_each_measure_are_those_of_predict(
+    over, shaking, model, tmp_path, figures
+) -> None:
+    picture = plot.curve(3.0, 0.05, tmp_path / "c.png", over=over, **shaking)
+    assert not picture.warnings
+    (axes,) = figures[0].axes
+    assert f"model {model}" in axes.get_title()
+    assert ("SA(0.3 s) 0.9 g" in axes.get_title()) == (0.3 in shaking.get("sa_g", {}))
+    x, y = axes.lines[0].get_data()
+    varied = {"pgv": {"pgv_m_s": x[80]}, "pga": {"pga_g": x[80]}}.get(over, {})
+    question = {**shaking, **varied}
+    if over == "sa(1)":
+        question["sa_g"] = {**shaking.get("sa_g", {}), 1.0: x[80]}
+    answer = predict(3.0, 0.05, **question)
+    assert answer.model == model
+    assert y[80] == pytest.approx(answer.probability, rel=1e-9)
+
+
+def test_a_measure_without_use_is_named(tmp_path) -> None:
+    picture = plot.curve(3.0, 0.05, tmp_path / "c.png", sa_g={1.0: 0.5})
+    assert any("sa_g was not used" in text for text in picture.warnings)
+
+
+def test_the_axis_of_a_named_model_is_its_first_measure_that_is_not_held(tmp_path, figures) -> None:
+    named = {"model": "rocking-pga", "kind": "rocking"}
+    for pga, axis in (({"pga_g": 0.4}, "PGV [m/s]"), ({}, "PGA [g]")):
+        plot.curve(3.0, 0.05, tmp_path / "c.png", **named, **pga)
+        assert figures[-1].axes[0].get_xlabel().endswith(axis)
 
 
 def test_a_missing_measure_is_named(tmp_path) -> None:

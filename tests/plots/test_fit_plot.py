@@ -4,11 +4,13 @@ import numpy as np
 import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 
+from rbfrag.db.location import REFERENCE
 from rbfrag.db.model_file import ModelRow
 from rbfrag.db.rows import CombinationTable
 from rbfrag.errors import InputError
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.plots import fit as fit_module
+from rbfrag.plots import plot
 from rbfrag.plots.fit import plot_fit
 from rbfrag.solver.results import NUMERICS_VERSION
 from tests.synthetic import unknown_measures
@@ -213,3 +215,17 @@ def test_models_of_other_blocks_are_rejected(table, tmp_path):
     )  # fmt: skip
     with pytest.raises(InputError, match="blocks with ks and ps2"):
         plot_fit(table, FragilityModel.from_row(row), tmp_path / "fit.png")
+
+
+@pytest.mark.parametrize("name", ["toppling-sa", "toppling-pgv_pga"])
+def test_models_of_a_spectral_velocity_are_drawn_over_what_they_expect(name, tmp_path, drawn):
+    picture = plot.fit(tmp_path / "fit.png", model=name, log=True, db=REFERENCE)
+    assert not picture.warnings
+    title = drawn[0].get_suptitle()
+    assert "spectral velocity at the block's periods" in title
+    assert r"\sigma" not in title  # its spectra are known
+    axes = drawn[0].axes[0]
+    assert "at 50 % probability of failure" in axes.get_xlabel()
+    upper, _, lower = (line.get_data() for line in axes.lines)
+    assert (upper[1] > upper[0]).all()
+    assert (lower[1] < lower[0]).all()

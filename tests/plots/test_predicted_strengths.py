@@ -17,7 +17,7 @@ G = 9.80665
 def test_each_motion_topples_its_block_with_the_probability() -> None:
     source = drawn_outcomes("logistic", "pgv", (-2.0, 4.8), events=4, motions=1)
     table = source.table
-    y = predicted_strengths(WITH_TM, table, source.xp_m_s, 0.3)
+    y = predicted_strengths(WITH_TM, table, 0.3)
     for i in range(table.p2.size):
         answer = predict(
             float(table.p2[i]),
@@ -37,7 +37,7 @@ def test_models_of_the_record_and_of_free_exponents_are_drawn(tmp_path) -> None:
     exponents = model_of("pgv", names, (-0.4, 0.95, -1.2, -0.1), "lognormal")
     for model in (record, exponents, WITH_TM):
         path = tmp_path / "fit.svg"
-        plot_fit(source.table, model, path, log=True, xp_m_s=source.xp_m_s)
+        plot_fit(source.table, model, path, log=True, measures={"xp_m_s": source.xp_m_s})
         assert "at 50 % probability of failure" in path.read_text(encoding="utf-8")
 
 

@@ -92,7 +92,7 @@ def test_a_table_becomes_one_document(shell: Shell) -> None:
         words = words_of(Path(out), pages=3)
         for text in (
             "Seismic fragility of rock blocks", "return period",
-            "A1 toppling (rock face behind) 5.3 %",
+            f"A1 toppling (rock face behind) {percent(prediction['probability'])}",
             "A2 rocking (free-standing)", "B sliding", "unstable at rest", "'x' is not a number",
             return_period(answer[2]["hazard"]["annual_rate"]), "sliding-pgv",
         ):  # fmt: skip
@@ -209,6 +209,19 @@ def test_a_report_has_the_limit_state_and_the_level_that_are_asked_for(tmp_path:
     assert any("80 % confidence" in value for _, value in result.summary)
 
 
+def test_the_curve_of_a_report_scales_all_measures() -> None:
+    shaking = {"pgv_m_s": 0.6, "pga_g": 0.5, "sa(1)": 0.5}
+    contents = contents_of({"p2": 3.0, "kr": 0.05, **shaking})
+    figure = report.new_figure(4.0, 4.0)
+    report._draw_panel(figure, "curve", contents)
+    (axes,) = figure.axes
+    assert axes.get_title() == "other measures in proportion"
+    x, y = axes.lines[0].get_data()
+    stronger = {name: value * x[60] / 0.6 for name, value in shaking.items()}
+    answer = rbfrag.predict(3.0, 0.05, sa_g={1.0: stronger.pop("sa(1)")}, **stronger)
+    assert y[60] == pytest.approx(answer.probability)
+
+
 def test_a_path_of_another_kind_is_rejected(rejects: Rejects) -> None:
     assert ".docx" in rejects("report", *SHAPE, "--out", "a.docx")
 
@@ -218,8 +231,10 @@ def test_a_path_of_another_kind_is_rejected(rejects: Rejects) -> None:
     [
         ({"block": ROCK}, {"pgv_m_s": 0.6, "pga_g": 0.5}, True),
         ({"block": ROCK, "kind": "rocking"}, {"pgv_m_s": 0.6}, False),
-        ({"block": ROCK, "kind": "rocking"}, {"sa10_g": 0.5, "pga_g": 0.6}, False),
+        ({"block": ROCK, "kind": "rocking"}, {"sa(1)": 0.5, "pga_g": 0.6}, False),
         ({"block": ROCK}, {"pgv_m_s": 0.6, "pga_g": 0.5, "tm_s": 0.6}, False),
+        ({"block": ROCK}, {"pgv_m_s": 0.6, "pga_g": 0.5, "sa(0.3)": 0.9, "sa(1)": 0.5}, True),
+        ({"block": ROCK}, {"sa(1)": 0.5}, False),
         (SLIDES, {"pgv_m_s": 0.6, "pga_g": 0.5}, True),
         ({"ky": 0.2, "displacement_m": 0.1}, {"pgv_m_s": 0.6}, False),
         ({"ks": 0.2, "ps2": 3.0}, {"pgv_m_s": 0.6, "pga_g": 0.5}, False),

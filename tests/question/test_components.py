@@ -30,6 +30,7 @@ from rbfrag.results.numbers import percent
 from rbfrag.service.app import make_app
 from rbfrag.service.settings import ServiceSettings
 from rbfrag.vocabulary.quantities import option_of, parameter_of
+from tests.by_period import by_period
 
 TOPPLING, ROCKING = {"p2": 3.0, "kr": 0.1}, {"p2": 3.0, "kr": 0.15, "kind": "rocking"}
 SLIDING = {"ky": 0.12, "displacement_m": 0.1}
@@ -40,10 +41,10 @@ CASES: dict[str, dict[str, Any]] = {
     "toppling-pgv": {**TOPPLING, "pgv_m_s": 0.6},
     "toppling-pgv-pga": {**TOPPLING, "pgv_m_s": 0.5, "pga_g": 0.3},
     "toppling-pgv-pga-tm": {**TOPPLING, "pgv_m_s": 0.5, "pga_g": 0.4, "tm_s": 0.7},
-    "toppling-pga-sa": {**TOPPLING, "pga_g": 0.4, "sa03_g": 0.9, "sa10_g": 0.5, "sa30_g": 0.15},
-    "toppling-pga-near-kr": {**TOPPLING, "pga_g": 0.11, "sa10_g": 0.4},
+    "toppling-pga-sa": {**TOPPLING, "pga_g": 0.4, "sa(0.3)": 0.9, "sa(1)": 0.5, "sa(3)": 0.15},
+    "toppling-pga-near-kr": {**TOPPLING, "pga_g": 0.11, "sa(1)": 0.4},
     "rocking-pgv": {**ROCKING, "pgv_m_s": 0.8},
-    "rocking-pgv-pga-sa": {**ROCKING, **STRONG, "sa10_g": 0.6, "sa30_g": 0.2},
+    "rocking-pgv-pga-sa": {**ROCKING, **STRONG, "sa(1)": 0.6, "sa(3)": 0.2},
     "sliding-pgv-pga-arias": {**SLIDING, **STRONG, "arias_m_s": 3.0},
     "slumping-pgv-pga": {**SLUMPING, **STRONG, "magnitude": 6.8},
     "confined-pgv-pga": {**CONFINED, **STRONG},
@@ -81,7 +82,7 @@ def test_the_ratios_are_those_of_the_papers() -> None:
         assert rotd100.spectral_ratio(period) == pytest.approx(ratio)
     assert rotd100.spectral_ratio(np.sqrt(3.0)) == pytest.approx(1.245)  # linear in ln T
     assert (rotd100.spectral_ratio(0.001), rotd100.spectral_ratio(20.0)) == (1.19, 1.29)
-    names = ("pga_g", "pgv_m_s", "pgd_m", "sa03_g", "arias_m_s", "tm_s", "magnitude")
+    names = ("pga_g", "pgv_m_s", "pgd_m", "sa(0.3)", "arias_m_s", "tm_s", "magnitude")
     expected = (1.19, 1.25, 1.25, 1.22, 1.19**2, 1.0, 1.0)
     assert [rotd100.ratio(n) for n in names] == pytest.approx(expected)
     assert [larger.ratio(n) for n in names] == pytest.approx([1.14] * 4 + [1.14**2, 1.0, 1.0])
@@ -110,14 +111,19 @@ def test_every_interface_equals_a_dense_integration(
     assert many.probability[1] == pytest.approx(reply.probability, rel=1e-6)
     assert many.probability[0] == pytest.approx(answer(question).probability, rel=1e-6)
     options = [
-        part for n, value in {**question, "component": name}.items()
-        for part in (option_of(n), str(value))
+        part for n, value in by_period({**question, "component": name}, "=").items()
+        for text in (value if isinstance(value, list) else [value])
+        for part in (option_of(n), str(text))
     ]  # fmt: skip
     printed = CliRunner().invoke(app, ["predict", *options, "--db", str(REFERENCE), "--json"])
     assert json.loads(printed.stdout)["probability"] == reply.probability
-    sent = {parameter_of(n): value for n, value in {**question, "component": name}.items()}
+    texts = by_period({**question, "component": name}, ":")
+    sent = {parameter_of(n): value for n, value in texts.items()}
     got = client.get("/v1/predict", params=sent).json()
     assert got["probability"] == reply.probability
+    sent = {
+        parameter_of(n): value for n, value in by_period({**question, "component": name}).items()
+    }
     of_all = client.post("/v1/predict", json=sent).json()
     assert of_all["probability"] == reply.probability
     listed = {**sent, "component": [None, name]}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from rbfrag.question.bssa14 import PERIODS_S
 from rbfrag.question.scenario import Source, scenario_shaking
 
 SITE = {"magnitude": 6.8, "rjb_km": 12.0, "vs30_m_s": 760.0}
@@ -19,7 +20,9 @@ def test_the_median_comes_first_with_its_percentiles() -> None:
         ("Model", "BSSA14 (Boore et al. 2014), component RotD50"),
     ]
     (table,) = answer.tables()
-    assert [row[0] for row in table.rows] == ["PGV", "PGA", "SA(0.3 s)", "SA(1 s)", "SA(3 s)"]
+    assert [row[0] for row in table.rows] == [
+        "PGV", "PGA", *(f"SA({period_s:g} s)" for period_s in PERIODS_S),
+    ]  # fmt: skip
     assert answer.document() == answer.as_dict()
 
 

@@ -15,6 +15,7 @@ from rbfrag.question.table import columns_in, field_of, header_of, header_row
 from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.stability.single import stability
 from rbfrag.vocabulary.quantities import COLUMNS, INPUTS, column_of
+from rbfrag.vocabulary.spectral import BY_PERIOD, input_of
 
 
 @pytest.mark.parametrize(
@@ -28,8 +29,11 @@ from rbfrag.vocabulary.quantities import COLUMNS, INPUTS, column_of
         ("Friction angle (°)", "phi_deg", "°"),
         ("PGV [cm/s]", "pgv_m_s", "cm/s"),
         ("pga", "pga_g", None),
-        ("SA(1.0) [g]", "sa10_g", "g"),
-        ("sa03", "sa03_g", None),
+        ("SA(1.0) [g]", "sa(1)", "g"),
+        ("sa(0.5)", "sa(0.5)", None),
+        ("SA(0.5s)", "sa(0.5)", None),
+        ("SA (0.50 s) [cm/s2]", "sa(0.5)", "cm/s2"),
+        ("sa(0.5)_sigma", "sa(0.5)_sigma", None),
         ("Block", "block_id", None),
         ("p2_1_s2", "p2", None),
         ("H_m", "height_m", "m"),
@@ -104,8 +108,10 @@ def test_losses_are_in_any_currency() -> None:
 
 
 def test_a_name_for_a_column_states_its_field_and_unit() -> None:
-    for name in COLUMNS:
-        assert columns_in([header_of(name)], "a.csv", [name]).columns[name].factor == 1.0
+    for name in (*COLUMNS, "sa(0.5)", "sa(0.5)_sigma"):
+        if name in BY_PERIOD:
+            continue  # which have columns by period
+        assert columns_in([header_of(name)], "a.csv", [input_of(name)]).columns[name].factor == 1.0
 
 
 NAMES = ["Block", "H [m]", "W [m]"]

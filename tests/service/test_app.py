@@ -50,7 +50,7 @@ def test_the_vocabulary_is_served(client):
     assert quantities["intensity_m_s"]["parameters"] == []
     labels = {term["name"]: term["label"] for term in document["terms"]}
     assert {*labels} == {*TERMS}
-    assert labels["pgv_pga_tm"] == "PGV, PGA and Tm"
+    assert labels["pgv_pga_m"] == "PGV, PGA and magnitude"
 
 
 def test_the_page_is_there(client):

@@ -55,7 +55,7 @@ def test_every_operation_documents_its_errors(client):
 NO_UNIT = {"form", "sheet", "ignore_columns", "drainage", "name",
     "amplification", "amplification_sigma", "back", "base", "face", "mechanism", "pga_sigma",
     "pgv_sigma", "pgv_tau",
-    "sa03_sigma", "sa10_sigma", "sa30_sigma",
+    "sa_sigma",
     "component", "convert", "convert_sigma", "imt", "jrc", "kct", "kct_sigma", "kind", "kr",
     "kr_sigma", "ks", "ks_sigma", "ky", "ky_sigma", "level", "magnitude", "map", "model", "n",
     "no_back", "p2_sigma", "pct2_sigma", "polarity", "ps2_sigma", "restitution",

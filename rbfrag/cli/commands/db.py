@@ -25,13 +25,18 @@ def upgrade(db: options.Db = None, json: options.Json = False) -> None:
     """Upgrade a database to the current schema."""
     from rbfrag.db.engine import upgrade_database
 
-    before, after = upgrade_database(db)
+    before, after, deleted = upgrade_database(db)
     if json:
-        print_json({"from": before, "to": after})
+        print_json({"from": before, "to": after, "deleted_models": list(deleted)})
     elif before == after:
         print(f"schema {after}: nothing to do")
     else:
         print(f"schema {before} upgraded to {after}")
+        if deleted:
+            print(
+                f"Fitted models of a form that is no longer supported were deleted: "
+                f"{', '.join(deleted)}; fit them again by  rbfrag fit"
+            )
 
 
 @app.command("info", epilog="Example:  rbfrag db info --by suite")

@@ -29,7 +29,7 @@ def _functions(
     blocks: BlocksOrRockMass,
     answering: Annotated[Inputs, Fields(*ANSWERING, without=("level",))],
     name: str = option("Identifier of the single block or of the rock mass", "block"),
-    imt: str = option("Intensity measure of the fragility function: PGV, PGA, or SA at 1 s", "PGV"),
+    imt: str = option("Intensity measure of the fragility function: PGV, PGA, 'SA(0.5)'", "PGV"),
     levels: int = option(
         "Maximum number of intensity levels of a function that is not lognormal", 80
     ),

@@ -12,7 +12,7 @@ EXAMPLE = "Example:  rbfrag fit --term pgv"
 
 
 TERM_LIST = "; ".join(
-    f"{term.name} ({', '.join(map(word_of, term.inputs))})" for term in TERMS.values()
+    f"{term.name} ({', '.join(map(word_of, term.inputs or ('sa_g',)))})" for term in TERMS.values()
 )
 """The terms with the measures that each uses."""
 
@@ -38,8 +38,7 @@ def fit(
     kind: str = option(
         "Kind of failure: toppling; slumping and confined_toppling, with pgv_pga and "
         "pgv_pga_m; sliding, with these, pgv and pgv_pga_ia; rocking (free-standing), with "
-        "pgv, pgv_pga, sa10, pga_sa10, pga_m, pgv_pga_sa10_sa30 and pga_sa10_sa30; or "
-        "another kind of a stored campaign",
+        "pga, sa and pgv; or another kind of a stored campaign",
         "toppling",
     ),
     rotation: float | None = option(
@@ -48,9 +47,9 @@ def fit(
     ),
     method: str | None = option(
         "Method for blocks with p2 and kr; of critical values: wls (weighted least squares, "
-        "as in the dissertation), lognormal (with censored motions); of outcomes: logistic, "
-        "bounded; with xp: record [default: best score in leave-one-earthquake-out "
-        "cross-validation]",
+        "as in the dissertation), lognormal (with censored motions); of outcomes: toppling, "
+        "logistic; with xp: record [default: toppling or record where they use the measures, "
+        "else logistic]",
         show_default=False,
     ),
     free_m: bool = option(

@@ -71,7 +71,7 @@ def hazard(
     The fragility function is integrated over the hazard curve. Blocks of --blocks are assigned to
     the sites of the curves by site_id, or to the nearest site by lon and lat. --joint adds the rate
     of earthquakes in which at least one block of a site fails, from the dependence model of the
-    fragility model. Curves of PGV, SA at 1 s and PGA are supported, each with a model of the same
+    fragility model. Curves of PGV, SA and PGA are supported, each with a model of the same
     intensity measure; other curves require --convert. With --weights the curves are logic-tree
     branches: the result is the mean rate and its distribution over the branches. Toppling blocks
     are backed by a rock face; a free-standing block overturns at weaker shaking: --kind rocking.

@@ -51,9 +51,9 @@ def losses(
     expected: bool = option("Expected values only, without samples and curves", False),
     seed: int = option("Seed of the samples", 0),
     imt: str | None = option(
-        "Intensity measure: PGV, 'SA(1.0)', or PGA, converted to PGV with the magnitudes of "
+        "Intensity measure: PGV, 'SA(0.5)', or PGA, converted to PGV with the magnitudes of "
         "the ruptures; several (PGV,PGA) with their --model, sampled independently by "
-        "OpenQuake [default: PGV, else SA(1.0), as available]"
+        "OpenQuake [default: PGV, else SA(1.0), else other SA, as available]"
     ),
     component: str | None = option(
         "Horizontal component of the intensity measures: single, geometric_mean, rotd50, "

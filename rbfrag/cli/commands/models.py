@@ -11,7 +11,7 @@ from rbfrag.cli.command import Commands, argument, model_names
 from rbfrag.cli.output import print_result
 
 app = Commands(
-    "List, show and choose fitted fragility models.", "Example:  rbfrag models show logistic-pgv"
+    "List, show and choose fitted fragility models.", "Example:  rbfrag models show toppling-pgv"
 )
 
 Name = Annotated[
@@ -33,7 +33,7 @@ def list_models(db: options.Db = None, json: options.Json = False) -> None:
     print_result(ModelList(stored_rows(db)), json=json)
 
 
-@app.command("show", epilog="Example:  rbfrag models show logistic-pgv")
+@app.command("show", epilog="Example:  rbfrag models show toppling-pgv")
 def show_model(
     verbose: options.Verbose = False,
     json: options.Json = False,
@@ -58,7 +58,7 @@ def show_model(
     print_result(report, json=json, verbose=verbose, fields=())
 
 
-@app.command("default", epilog="Example:  rbfrag models default logistic-pgv")
+@app.command("default", epilog="Example:  rbfrag models default toppling-pgv")
 def set_default_model(name: Name, db: options.Db = None) -> None:
     """Set the default model of a kind, instead of the model with the best score."""
     from rbfrag.db.engine import opened_database

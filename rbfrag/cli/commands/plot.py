@@ -20,6 +20,7 @@ from rbfrag.errors import InputError
 from rbfrag.vocabulary.quantities import (
     BLOCK,
     COMMON,
+    INTENSITY,
     JOINT,
     MEASURED,
     PLANES,
@@ -36,7 +37,7 @@ app = Commands(
 Out = Annotated[str, typer.Option("--out", help="Output file (.png, .pdf, .svg)")]
 
 
-@app.command("fit", epilog="Example:  rbfrag plot fit --model logistic-pgv --out fit.png")
+@app.command("fit", epilog="Example:  rbfrag plot fit --model toppling-pgv --out fit.png")
 def plot_fit(
     *,
     out: Out,
@@ -63,14 +64,13 @@ def plot_chart(
         "Frequency parameter p² of the blocks [1/s²] [default: middle of the fitted range]"
     ),
     pga: float | None = option(
-        "PGA of the motions [g] [default: proportional to PGV, from the middle of the fitted range]"
+        "PGA of the motions [g], over PGV [default: proportional to PGV, from the middle of the "
+        "fitted range]"
     ),
-    tm: float | None = option(
-        "Mean period of the motions [s] [default: middle of the fitted range]"
-    ),
+    tm: float | None = option("Mean period of the motions [s], of models that use it"),
     model: str | None = option(
-        "Name of a model with a single intensity measure (PGV, SA(1), PGA, ...) or PGV with "
-        "PGA (and Tm); any model of kinds other than toppling [default: model used for PGV]"
+        "Name of a model, drawn over PGV, PGA or SA [default: model used for PGV and the given "
+        "measures]"
     ),
     displacement: float | None = option(
         "Displacement limit of sliding [m] [default: middle of the fitted range]"
@@ -79,8 +79,8 @@ def plot_chart(
 ) -> None:
     """Draw a design chart: lines of equal probability.
 
-    The axes are intensity and block. Further predictors are held constant: --p2, and for a model of
-    PGV with PGA --pga and --tm.
+    The axes are intensity and block. Further predictors are held constant: --p2, --pga of a model
+    of PGV with PGA, and --tm. The equation of the model stands below.
     """
     from rbfrag.plots import plot
 
@@ -105,8 +105,8 @@ def plot_curve(
     inputs: options.Block,
     held: options.Measures,
     over: str | None = option(
-        "Intensity measure on the horizontal axis: pgv, pga, pgd or sa10 [default: pgv, or "
-        "the first predictor of --model]"
+        "Intensity measure on the horizontal axis: pgv, pga, pgd or 'sa(1)' [default: pgv, or "
+        "the first predictor of --model that is not given]"
     ),
     answering: options.Ranging,
     compare: str | None = option(
@@ -133,7 +133,7 @@ def plot_curve(
     question: dict[str, Any] = {**inputs, **held, **answering}
     with inputs.named():
         picture = plot.curve(out=out, over=over, compared=published, **question)
-    print_warnings(picture.warnings)
+    print_warnings(picture.warnings, (*inputs, *INTENSITY))
     print(out)
 
 

@@ -31,7 +31,7 @@ def predict(
     blocks: str | None = option(
         "Table of blocks (.csv, .xlsx, .parquet, .geojson) with columns such as p2_1_s2 and kr, "
         "or height_m and width_m, or ky and displacement_m; standard deviations such as "
-        "kr_sigma; and pgv_m_s, pga_g, sa10_g etc.; values common to all rows can be options",
+        "kr_sigma; and pgv_m_s, pga_g, sa(1) etc.; values common to all rows can be options",
         None,
         "--blocks",
         "--batch",
@@ -60,10 +60,10 @@ def predict(
     interval. With --sites a prediction interval is added for the fraction of identical blocks that
     fails at these sites in one earthquake.
 
-    The intensity measures determine the model: PGV alone or with PGA, best with SA at 1 and 3 s or
-    Tm; PGA with spectral accelerations; SA at 1 s or PGA alone; for sliding and slumping also Arias
-    intensity or magnitude; or the accelerogram. Where they suffice for several models, the answers
-    of all are listed.
+    The intensity measures determine the model: PGV, PGA or both, best with spectral accelerations
+    (--sa) or Tm; spectral accelerations alone; for sliding and slumping also Arias intensity or
+    magnitude; or the accelerogram. Where they suffice for several models, --verbose lists the
+    answers of all.
 
     Toppling blocks are backed by a rock face; a free-standing block overturns at weaker shaking:
     --kind rocking.

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
 from rbfrag.cli import options
 from rbfrag.cli.command import argument, option
@@ -67,7 +66,6 @@ def rockmass(
     is averaged over the blocks of each mode with a fragility model.
     """
     from rbfrag.campaign.rock_mass_answer import rockmass as answered
-    from rbfrag.vocabulary.quantities import SPECTRAL
 
     check_files(table=out, plot=plot, excel_text=excel_text)
     ground = upward = None
@@ -77,13 +75,9 @@ def rockmass(
             motion, vertical, db=answering.get("db"), reading=reading
         )
         say_when_compiling()
-    intensities: dict[str, Any] = {**measures}
-    spectrum = {
-        period: intensities.pop(name) for period, name in SPECTRAL.items() if name in intensities
-    }
     with ProgressBar("rockmass", "blocks") as bar:
         answer = answered(
-            file, n=n, seed=seed, **intensities, sa_g=spectrum or None, motion=ground,
+            file, n=n, seed=seed, **measures, motion=ground,
             vertical=upward, polarity=direction,
             scales=options.number_list("1" if scales is None else scales, "--scales"),
             displacement_m=displacement, rotation_deg=rotation, jobs=jobs,

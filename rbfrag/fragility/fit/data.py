@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from typing import TYPE_CHECKING, Any, Unpack
 
@@ -19,12 +19,18 @@ from numpy.typing import ArrayLike, NDArray
 from rbfrag.db.rows import IMPORTED, CombinationTable, Selection
 from rbfrag.errors import FitError
 from rbfrag.fragility.domain import INSIDE, ratios_of
+from rbfrag.fragility.fit.completions import (
+    MotionTable,
+    ordinates_by_motion,
+    spectral_velocities,
+)
 from rbfrag.fragility.measures import Term
 from rbfrag.fragility.method import TOPPLING_BLOCK, BlockParameters, Method, arrays
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.results.numbers import exact_percent
 from rbfrag.solver.results import FloatArray
 from rbfrag.vocabulary.quantities import INTENSITY, MEASURES, QUANTITIES
+from rbfrag.vocabulary.spectral import spectral_names
 
 if TYPE_CHECKING:
     from sqlalchemy import Connection
@@ -102,6 +108,8 @@ class FitSource:
         sensitive: whether outcomes of the grid are other ones for the motion times 1 ± 1e-6, shape
             (n, m), NaN where that is not stored; None where it is of none.
         of_block: what is stored of the blocks in addition to their size, by name, shape (n,).
+        spectra: ordinates of each motion [g] at `SPECTRUM_PERIODS_S`, shape (n, 21), NaN where they
+            are not stored; None where none is.
         structures: number of motions that are excluded, recorded on structures.
         narrow: greatest (upper - lower)/lower of a critical value that counts as found.
     """
@@ -114,6 +122,7 @@ class FitSource:
     recording: NDArray[np.int64] | None = None
     sensitive: FloatArray | None = None
     of_block: Mapping[str, FloatArray] = field(default_factory=dict)
+    spectra: FloatArray | None = None
     structures: int = 0
     narrow: float = NARROW
 
@@ -167,6 +176,22 @@ def kr_over_pga_of_grid(p2: ArrayLike, pgv_m_s: ArrayLike, pga_g: ArrayLike) -> 
     return np.asarray(z[..., None] * Y0_OVER_PGV)
 
 
+def motions_of(source: FitSource, block: BlockParameters, events: Sequence[str]) -> MotionTable:
+    """Return the motions with response spectra that complete a spectral velocity.
+
+    Args:
+        block: what describes the blocks of the fit.
+        events: names of the earthquakes of the fit, in the order of its steps.
+    """
+    table, recording = source.table, source.recording
+    kr = kr_over_pga_of_grid(table.p2, table.pgv_m_s, table.pga_g) * table.pga_g[:, None]
+    is_judged = (kr >= KR[0]).any(axis=1)
+    chosen = np.flatnonzero(is_judged | (block.completed_from == "all"))
+    if source.spectra is None or recording is None:
+        raise FitError("the motions have no recordings or no response spectra: add them again")
+    return MotionTable.of(table.only(chosen), source.spectra[chosen], recording[chosen], events)
+
+
 def read_source(
     connection: Connection,
     block: BlockParameters = TOPPLING_BLOCK,
@@ -182,6 +207,7 @@ def read_source(
     """
     from rbfrag.db import queries
     from rbfrag.db.campaigns import spectrum_values
+    from rbfrag.db.motion_spectra import stored_spectra
 
     kind_read = kind or block.kind
     table = queries.combination_table(connection, kind=kind_read, **selection)
@@ -201,6 +227,7 @@ def read_source(
         np.array([recordings[motion] for motion in table.motion_id.tolist()], dtype=np.int64),
         grid.sensitive if np.isfinite(grid.sensitive).any() else None,
         {name: _numbers_of(table.block, name) for name in block.stored},
+        ordinates_by_motion(stored_spectra(connection), table.motion_id),
         0 if all_sensors else queries.motions_on_structures(connection, kind_read),
     )
     if grid.outcome.shape[1] == 0 and block.points == "strengths":
@@ -237,7 +264,7 @@ class FitData:
         blocks: what formulas read of the blocks of the grid, shape (n, m) or (n, 1).
         failed: what they do: 1 fails, 0 does not, NaN not known, shape (n, m).
         read: which of them this fit reads, same shape.
-        scored: which it is judged on, same shape.
+        scored: those of them that it is judged on, same shape.
         outcomes: where the outcomes come from, in words.
         domain: range of each variable that the fit covers.
         n_excluded: combinations left out because a measure that the term reads is not known.
@@ -480,10 +507,9 @@ def ratio_columns(measures: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
 
 def _measures(source: FitSource) -> dict[str, FloatArray]:
     table = source.table
-    return {
-        "xp_m_s": source.xp_m_s,
-        **{name: table.measure(name) for name in INTENSITY if QUANTITIES[name].stored},
-    }
+    stored = (name for name in INTENSITY if QUANTITIES[name].stored)
+    names = (*stored, *spectral_names(table.measures))
+    return {"xp_m_s": source.xp_m_s, **{name: table.measure(name) for name in names}}
 
 
 def _column(values: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
@@ -499,8 +525,18 @@ def _strengths(source: FitSource, method: Method, term: Term) -> _Points:
     # y*, and a block of the grid has y0 = (k/PGA) PGA g/p.
     p, pga_m_s2 = np.sqrt(table.p2), table.pga_g * STANDARD_GRAVITY_M_S2
     measures = {**_measures(source), "p": p}
+    velocity, needed = method.forms[term.name].velocity, [*term.inputs]
+    if velocity is not None:
+        if source.spectra is None or not np.isfinite(source.spectra).any():
+            raise FitError(
+                f"method {method.name} requires the response spectra of the motions, and none are "
+                "stored: add the motions again with their samples, or fit method logistic"
+            )
+        with np.errstate(divide="ignore", invalid="ignore"):
+            measures["velocity_m_s"] = spectral_velocities(velocity, source.spectra, p)
+        needed.append("velocity_m_s")
     x = np.asarray(term.intensity_m_s(measures), dtype=np.float64)
-    for name in term.inputs:
+    for name in needed:
         x = np.where(np.isfinite(measures[name]), x, np.nan)
     defined = np.isfinite(x)
     if not defined.any() and "tm_s" in term.inputs:
@@ -525,37 +561,39 @@ def _strengths(source: FitSource, method: Method, term: Term) -> _Points:
     y = np.where(observed, table.y_m_s, np.where(open_above, highest, limit))
     least = np.where(searched & open_above, table.y_m_s, np.nan)
     readable = np.isin(status, ("found", *_CENSORED, "not_searched"))
-    of_motion = {name: measures[name] for name in dict.fromkeys(("pgv_m_s", "pga_g", *term.inputs))}
+    of_motion = {name: measures[name] for name in dict.fromkeys(("pgv_m_s", "pga_g", *needed))}
+    if velocity is not None:  # what completes it
+        more = (name for name in velocity.optional if name not in of_motion)
+        of_motion |= {name: measures[name] for name in more}
     of_motion |= {"tm_s": table.tm_s, "p2": table.p2, "p": p, "intensity_m_s": x}
     of_motion |= source.of_block
     for name, values in method.block.stored.items():
         if values:
             readable &= np.isin(source.of_block[name], values)
-    # Blocks that a fit uses lie within KR; scores use the grid in y0/PGV that all models share.
+    # Blocks of fits and scores lie within KR; scores use the grid in y0/PGV that all models share.
     kr = source.k_over_pga * table.pga_g[:, None]
     y0 = source.k_over_pga * (pga_m_s2 / p)[:, None]
     with np.errstate(divide="ignore", invalid="ignore"):
         ratio = y0 / table.pgv_m_s[:, None]
-    some_block = np.isfinite(y0) & (kr >= KR[0])
-    read = some_block & (kr <= KR[1])
-    scored = some_block & (ratio >= Y0_OVER_PGV[0] * (1.0 - 1e-9))
+    read = np.isfinite(y0) & (kr >= KR[0]) & (kr <= KR[1])
+    scored = read & (ratio >= Y0_OVER_PGV[0] * (1.0 - 1e-9))
     scored[:, simulated:] = False
-    scored &= kr <= method.block.judged_kr
     failed, source_of_outcomes = source.judged_outcomes(y0, y, least)
-    has_blocks = (read | scored).any(axis=0)
+    has_blocks = read.any(axis=0)
     of_outcomes = method.reads == "outcomes"
     ranges = {
-        "p2": table.p2,
+        "p2": np.where(table.p2 >= method.block.smallest_p2, table.p2, np.nan),
         "intensity_m_s": x,
         "y_m_s": np.where(read, y0, np.nan)[:, has_blocks] if of_outcomes else y,
         "tm_s": table.tm_s,
-        **{
-            name: measures[name]
-            for name in term.inputs
-            if not np.array_equal(measures[name], x, True)
-        },
+        **{name: measures[name] for name in needed if not np.array_equal(measures[name], x, True)},
         **ratio_columns({**measures, "p": p}),
     }
+    if velocity is not None:
+        # a few motions of very long or short pulses do not stand for a range
+        pulse = ranges["pgv_over_pga_s"]
+        low, high = np.nanquantile(pulse[defined], (0.5 - 0.5 * INSIDE, 0.5 + 0.5 * INSIDE))
+        ranges["pgv_over_pga_s"] = np.where((pulse >= low) & (pulse <= high), pulse, np.nan)
     if not of_outcomes:
         ranges = {name: np.where(observed, v, np.nan) for name, v in ranges.items()}
     ranges["kr"] = np.tile(KR, (x.size, 1))

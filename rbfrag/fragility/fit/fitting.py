@@ -3,28 +3,38 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from os import PathLike
-from typing import TYPE_CHECKING, Required, Unpack
+from typing import TYPE_CHECKING, Required, Unpack, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rbfrag.db.model_file import ModelRow, reject_taken
+from rbfrag.db.model_file import COMPARED, ModelRow, reject_taken
 from rbfrag.db.rows import IMPORTED, CombinationTable, Selection
 from rbfrag.errors import FitError, InputError
+from rbfrag.fragility.completion import encode_regressions
 from rbfrag.fragility.domain import INSIDE
-from rbfrag.fragility.fit.data import NARROW, FitData, FitSource, fit_data, read_source
+from rbfrag.fragility.fit.completions import regressions
+from rbfrag.fragility.fit.data import (
+    NARROW,
+    FitData,
+    FitSource,
+    fit_data,
+    motions_of,
+    read_source,
+)
 from rbfrag.fragility.fit.dependence import estimate_dependence, observed_blocks
 from rbfrag.fragility.fit.line import fit_wls
+from rbfrag.fragility.fit.losses import losses_by_inputs
 from rbfrag.fragility.fit.maximum_likelihood import fit_censored, fit_lognormal, fit_outcomes
 from rbfrag.fragility.fit.report import FitReport, log_correlations, power_law
 from rbfrag.fragility.fit.result import FEW_EVENTS, MethodResult, cr3
 from rbfrag.fragility.measures import Term, intensity_term
 from rbfrag.fragility.method import Method
 from rbfrag.fragility.methods import method_named, methods
-from rbfrag.fragility.model import IS_ESTIMATED, FragilityModel
+from rbfrag.fragility.model import IS_ESTIMATED, LOSSES, FragilityModel
 from rbfrag.motions.sample_motions import PULSE
 from rbfrag.solver.results import NUMERICS_VERSION, FloatArray
 from rbfrag.threads import with_one_thread
@@ -166,7 +176,7 @@ def method_of_kind(
             method for method in candidates if term in method.forms and reads in ("", method.reads)
         ]
         able = (method for method in suited if method.exponent or not estimate_m)
-        return min(able, key=lambda method: method.forms[term].rank, default=candidates[0])
+        return min(able, key=lambda method: method.name in COMPARED, default=candidates[0])
     chosen = method_named(name)
     if chosen not in candidates:
         raise InputError(
@@ -225,6 +235,11 @@ def fit_source(
         for bound in method.forms[term.name].bounds:
             fitted &= ~bound.holds(data.blocks)
     warnings = [*_data_warnings(data, source), *result.warnings, *unknown]
+    completions = None
+    if (velocity := method.forms[term.name].velocity) is not None:
+        names = cast("list[str]", result.details["fitted_events"])
+        motions = motions_of(source.only(data.combination), method.block, names)
+        completions = encode_regressions(regressions(term, velocity, motions))
     row = ModelRow(
         name=name or _name(method, term, data.kind, chosen),
         kind=data.kind,
@@ -234,6 +249,7 @@ def fit_source(
         covariance=tuple(tuple(line) for line in cr3(result.steps).tolist()),
         leave_out_steps=tuple(tuple(line) for line in result.steps.tolist()),
         dependence=shared,
+        completions=completions,
         domain=data.domain,
         data_fingerprint=data.fingerprint,
         diagnostics={
@@ -264,12 +280,21 @@ def fit_source(
             "seed": seed,
             IS_ESTIMATED: dependence,
             **({"why_method": why} if why else {}),
-            "mahalanobis": joint_scatter((*method.block.names, *term.inputs), data.blocks, fitted),
+            "mahalanobis": joint_scatter(
+                (*method.block.names, *term.inputs, *["velocity_m_s"] * (velocity is not None)),
+                data.blocks,
+                fitted,
+            ),
             **result.details,
         },
         created=datetime.now(UTC).isoformat(timespec="seconds"),
     )
-    return Fitted(FitReport.from_model(FragilityModel.from_row(row)), data, result)
+    model = FragilityModel.from_row(row)
+    if velocity is not None and source.spectra is not None:
+        losses = losses_by_inputs(model, data, source.spectra[data.combination])
+        diagnostics = {**row.diagnostics, LOSSES: losses}
+        model = FragilityModel.from_row(replace(row, diagnostics=diagnostics))
+    return Fitted(FitReport.from_model(model), data, result)
 
 
 def joint_scatter(

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 import warnings
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -30,13 +30,14 @@ _HALF_LN_2PI = 0.5 * math.log(2.0 * math.pi)
 
 @dataclass(frozen=True, eq=False)
 class Binomial:
-    """Rows of a fit of outcomes, P = F(features · b).
+    """Rows of a fit of outcomes, P = F(features · b + offset).
 
     Args:
         columns: features, shape (n, k).
         outcome: 1 failed, 0 not, shape (n,).
         weights: weight of each row, shape (n,).
         event: number of each row's earthquake, shape (n,).
+        offset: what held parameters add to eta, shape (n,); None for none.
     """
 
     link: Link
@@ -44,6 +45,7 @@ class Binomial:
     outcome: FloatArray
     weights: FloatArray
     event: NDArray[np.intp]
+    offset: FloatArray | None = None
     last: list[FloatArray] = field(default_factory=list, init=False, repr=False)
     """Parameters of the last call, linear predictor and P: the derivatives follow a loss."""
 
@@ -52,12 +54,23 @@ class Binomial:
         columns, outcome, weights = (
             part[chosen] for part in (self.columns, self.outcome, self.weights)
         )
-        return Binomial(self.link, columns, outcome, weights, self.event[chosen])
+        offset = None if self.offset is None else self.offset[chosen]
+        return Binomial(self.link, columns, outcome, weights, self.event[chosen], offset)
+
+    def holding(self, index: int, value: float) -> Binomial:
+        """Return the rows with a parameter held at a value, and without its column."""
+        offset = value * self.columns[:, index] + (0.0 if self.offset is None else self.offset)
+        return replace(self, columns=np.delete(self.columns, index, axis=1), offset=offset)
+
+    def eta(self, b: FloatArray) -> FloatArray:
+        """Return the linear predictor of each row."""
+        eta = self.columns @ b
+        return eta if self.offset is None else eta + self.offset
 
     def _eta_and_p(self, b: FloatArray) -> list[FloatArray]:
         # eta is limited to the finite range of exponentials; arrays of parameters do not change
         if not self.last or self.last[0] is not b:
-            eta = np.clip(self.columns @ b, -700.0, 700.0)
+            eta = np.clip(self.eta(b), -700.0, 700.0)
             p = np.asarray(self.link.probability(eta, arrays()), dtype=np.float64)
             self.last[:] = b, eta, p
         return self.last[1:]
@@ -87,6 +100,7 @@ class Binomial:
     def start(self) -> FloatArray:
         """Return starting values: least squares of P = 0.9 and 0.1."""
         middle = self.link.quantile(np.where(self.outcome > 0.5, 0.9, 0.1), arrays())
+        middle = middle if self.offset is None else middle - self.offset
         root = np.sqrt(self.weights)
         return np.asarray(
             np.linalg.lstsq(self.columns * root[:, None], middle * root, rcond=None)[0],
@@ -287,7 +301,7 @@ def most_likely(rows: Binomial) -> FloatArray:
             "can be fitted to identical outcomes; add motions or block sizes (p²)"
         )
     b, settled = maximise(rows, rows.start(), tolerance=1e-14)
-    eta = rows.columns @ b
+    eta = rows.eta(b)
     if eta[failed].min() > eta[~failed].max() or not settled or np.abs(b).max() > 1e3:
         raise FitError(
             "the outcomes are separated without error by the intensity (toppled above, safe below, "
@@ -323,6 +337,7 @@ def fit_by_statsmodels(rows: Binomial) -> tuple[FloatArray, FloatArray, FloatArr
             rows.columns,
             family=sm.families.Binomial(theirs[rows.link.name]()),
             var_weights=rows.weights,
+            offset=rows.offset,
         )
         naive = model.fit(start_params=start, tol=1e-12, maxiter=100)
         result = model.fit(

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -50,8 +50,7 @@ class OutcomeRows:
     """The rows of a fit, and their indices in the grid.
 
     Args:
-        data: features, outcomes, weights and earthquakes; blocks that are judged and not fitted
-            have the weight 0.
+        data: features, outcomes, weights and earthquakes.
         place: flat index on the grid (n, m) of each row.
         bounded: whether mechanics forbids the block, on the grid.
         bounded_failed: known outcomes that failed although mechanics forbids it (vertical motion,
@@ -81,6 +80,9 @@ class OutcomeRows:
         return grid
 
 
+LEAST = 0.02
+"""Least coefficient of a feature that falls with the strength of the block."""
+
 _MOST_ALIKE = 1e11
 """Condition number of the parameters' correlations from which on they are not told apart."""
 
@@ -99,32 +101,28 @@ def fit_outcomes(
     # over all blocks of the outcome grid that mechanics allows to fail.
     form, names = method.forms[term.name], parameter_names(method, term, estimate_m=estimate_m)
     rows = outcome_rows(data, method, term, names)
-    fitted = rows.data.only(rows.data.weights > 0.0)
+    fitted = rows.data
     failures = int((fitted.outcome > 0.5).sum())
     if 0 < failures < FEWEST_FAILURES:
         raise FitError(
             f"{failures} outcomes on the grid toppled; a fit requires {FEWEST_FAILURES}: add "
             "stronger motions or more block sizes (p²)"
         )
-    with np.errstate(invalid="ignore"), warnings.catch_warnings():
-        warnings.filterwarnings("ignore", "The design matrix is rank-deficient")
-        try:
-            b, cr1, naive = fit_by_statsmodels(fitted)
-            variances = np.concatenate([np.diag(cr1), np.diag(naive)])
-        except np.linalg.LinAlgError:
-            variances = np.array([np.nan])
-    # a parameter that these blocks leave open has no variance that is one, or parameters vary
-    # together: rounding decides whether the matrix is singular
-    apart = bool((np.isfinite(variances) & (variances > 0.0)).all())
-    if apart:
-        sd = np.sqrt(np.diag(naive))
-        apart = float(np.linalg.cond(naive / np.outer(sd, sd))) < _MOST_ALIKE
-    if not apart:
-        raise FitError(
-            f"the blocks and {len(data.event_names)} earthquakes do not identify the {len(names)} "
-            f"parameters of method {method.name}: simulate more block sizes (p²) or earthquakes, "
-            "or fit a method of fewer parameters, such as logistic"
+    # Box constraint: a coefficient by which stronger blocks would fail more often is held at its
+    # least, and the others are estimated again.
+    estimated, held = [*range(len(names))], []
+    while True:
+        b, cr1, naive = _estimated(fitted, data, method)
+        low = [j for j, i in enumerate(estimated) if names[i] in form.positive and b[j] < LEAST]
+        if not low:
+            break
+        name = names[estimated.pop(low[0])]
+        held.append(
+            f"{name} is held at {LEAST:g}: by the estimate {b[low[0]]:.3g} stronger blocks would "
+            "fail more often; add motions of other earthquakes"
         )
+        fitted = fitted.holding(low[0], LEAST)
+        rows = replace(rows, data=rows.data.holding(low[0], LEAST))
     # Outcomes of one earthquake are not independent: the covariance comes from the changes of b
     # when each earthquake in turn is omitted (CR3), the bootstrap draws whole earthquakes.
     steps = jackknife_steps(fitted, b)
@@ -136,20 +134,29 @@ def fit_outcomes(
     samples = None
     if resample:
         samples = bootstrap(fitted.event, resampled, replicates=OUTCOME_REPLICATES, seed=seed)
+
+    def of_all(values: FloatArray, held_at: float = 0.0) -> FloatArray:
+        result = np.full((*values.shape[:-1], len(names)), held_at)
+        result[..., estimated] = values
+        return result
+
     estimates = Estimates(
-        names, b, steps, samples, seed,
-        {"cr1_standard_errors": np.sqrt(np.diag(cr1)),
-         "naive_standard_errors": np.sqrt(np.diag(naive))},
+        names, of_all(b, LEAST), of_all(steps),
+        None if samples is None else of_all(samples, LEAST), seed,
+        {"cr1_standard_errors": of_all(np.sqrt(np.diag(cr1))),
+         "naive_standard_errors": of_all(np.sqrt(np.diag(naive)))},
     )  # fmt: skip
     # How far each critical value lies from the block with P = 1/2, as a check on the scale of eta.
     residual = None
     if data.observed.any():
         with np.errstate(invalid="ignore", divide="ignore"):
-            median = median_y_m_s(form, method, b, data)
+            median = median_y_m_s(form, method, estimates.values, data)
             residual = np.where(data.observed, np.log(data.y) - np.log(median), np.nan)
-    sensitive = {}
+    more: dict[str, object] = {}
+    if form.velocity is not None:
+        more["fitted_events"] = [data.event_names[e] for e in np.unique(fitted.event)]
     if data.sensitive is not None:
-        sensitive["sensitive_share"] = float(np.nanmean(data.sensitive.ravel()[rows.place]))
+        more["sensitive_share"] = float(np.nanmean(data.sensitive.ravel()[rows.place]))
     return method_result(
         data,
         estimates,
@@ -162,10 +169,37 @@ def fit_outcomes(
             "n_toppled": failures,
             "n_bounded": int(rows.bounded.sum()),
             "n_bounded_toppled": rows.bounded_failed,
-            **sensitive,
+            **more,
         },
-        warnings=_warnings(data, rows, estimates),
+        warnings=[*held, *_warnings(data, rows, estimates)],
     )
+
+
+def _estimated(
+    rows: Binomial, data: FitData, method: Method
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return parameters and covariances; see :func:`fit_by_statsmodels`."""
+    size = rows.columns.shape[1]
+    with np.errstate(invalid="ignore"), warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "The design matrix is rank-deficient")
+        try:
+            b, cr1, naive = fit_by_statsmodels(rows)
+            variances = np.concatenate([np.diag(cr1), np.diag(naive)])
+        except np.linalg.LinAlgError:
+            variances = np.array([np.nan])
+    # a parameter that these blocks leave open has no variance that is one, or parameters vary
+    # together: rounding decides whether the matrix is singular
+    apart = bool((np.isfinite(variances) & (variances > 0.0)).all())
+    if apart:
+        sd = np.sqrt(np.diag(naive))
+        apart = float(np.linalg.cond(naive / np.outer(sd, sd))) < _MOST_ALIKE
+    if not apart:
+        raise FitError(
+            f"the blocks and {len(data.event_names)} earthquakes do not identify the {size} "
+            f"parameters of method {method.name}: simulate more block sizes (p²) or earthquakes, "
+            "or fit a method of fewer parameters, such as logistic"
+        )
+    return b, cr1, naive
 
 
 def parameter_names(method: Method, term: Term, *, estimate_m: bool = False) -> tuple[str, ...]:
@@ -178,7 +212,7 @@ def outcome_rows(data: FitData, method: Method, term: Term, names: tuple[str, ..
     """Return the known outcomes with their features."""
     form, shape = method.forms[term.name], data.failed.shape
     positive = (data.grid("intensity_m_s") > 0.0) & (data.grid("pga_g") > 0.0)
-    is_known = positive & (data.read | data.scored) & np.isfinite(data.failed)
+    is_known = positive & data.read & np.isfinite(data.failed)
     bounded = np.zeros(shape, dtype=np.bool_)
     for bound in form.bounds:
         bounded |= np.broadcast_to(bound.holds(data.blocks), shape)
@@ -189,10 +223,8 @@ def outcome_rows(data: FitData, method: Method, term: Term, names: tuple[str, ..
     columns = np.column_stack([np.broadcast_to(f, place.size) for f in features])
     finite = np.isfinite(columns).all(axis=1)
     place, columns = place[finite], columns[finite]
-    failed, read = data.failed.ravel()[place], data.read.ravel()[place].astype(np.float64)
-    rows = Binomial(
-        method.link, np.ascontiguousarray(columns), failed, read, data.event[place // shape[1]]
-    )
+    failed, event = data.failed.ravel()[place], data.event[place // shape[1]]
+    rows = Binomial(method.link, np.ascontiguousarray(columns), failed, np.ones(failed.size), event)
     return OutcomeRows(rows, place, bounded, int((data.failed[bounded] > 0.5).sum()))
 
 
@@ -368,8 +400,8 @@ def censored_rows(data: FitData, form: Form) -> CensoredNormal:
     """Return the likelihood of a formula over the rows of a fit."""
 
     def formula(b: FloatArray, values: Mapping[str, FloatArray]) -> Standardised:
-        eta, slopes, log_sigma, sigma_slopes = form.eta(b.tolist(), values, arrays())
-        return eta, log_sigma, slopes, sigma_slopes
+        predictor = form.eta(b.tolist(), values, arrays())
+        return predictor.eta, predictor.log_sigma, predictor.slopes, predictor.sigma_slopes
 
     return CensoredNormal(formula, data.values, data.observed, data.event)
 
@@ -417,6 +449,6 @@ def _line(
     form: Form, names: tuple[str, ...], values: Mapping[str, FloatArray]
 ) -> tuple[FloatArray, FloatArray]:
     """Return regressors and response of a formula that is (columns · β - response)/σ."""
-    eta, slopes, _, _ = form.eta([0.0] * len(names), values, arrays())
+    eta, slopes, *_ = form.eta([0.0] * len(names), values, arrays())
     columns = [s for name, s in zip(names, slopes, strict=True) if name != _LN_SIGMA]
     return np.column_stack([np.broadcast_to(c, eta.size) for c in columns]), -eta

@@ -113,7 +113,10 @@ class FitReport(Result):
             yield TextLine("Where", condition)
         strong = self.scores.get("log_loss_held_out_kr05")
         if strong is not None:
-            yield TextLine("Score", f"log loss {rounded(strong)} for blocks with k_r ≥ 0.05")
+            spectra = self.model.form.velocity is not None
+            also = "; both with response spectra, rbfrag models list has others" if spectra else ""
+            text = f"log loss {rounded(strong)} for blocks with k_r ≥ 0.05{also}"
+            yield TextLine("Score", text)
 
     def tables(self, *, verbose: bool = False) -> Iterator[TextTable]:
         """Yield the parameters; if verbose also counts, what blocks share, and all scores."""

@@ -262,14 +262,14 @@ def event_derivatives(rows: Likelihood, b: FloatArray) -> tuple[FloatArray, Floa
 
 
 def jackknife_steps(rows: Likelihood, b: FloatArray) -> FloatArray:
-    """Return the jackknife steps d_e = (H - H_e)⁻¹ s_e of each earthquake, shape (G, k).
+    """Return the jackknife steps d_e = -(H - H_e)⁻¹ s_e of each earthquake, shape (G, k).
 
     One Newton step from the fit to all data to the one without earthquake e.
     """
     scores, parts = event_derivatives(rows, b)
     _, information = rows.derivatives(b)
     return np.array([
-        np.linalg.lstsq(information - part, score, rcond=None)[0]
+        -np.linalg.lstsq(information - part, score, rcond=None)[0]
         for score, part in zip(scores, parts, strict=True)
     ])  # fmt: skip
 

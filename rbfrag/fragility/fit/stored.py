@@ -12,13 +12,25 @@ from functools import partial
 from os import PathLike
 from typing import TYPE_CHECKING, Any, Literal, Unpack, cast
 
+import numpy as np
+
 from rbfrag.db.engine import open_database, opened_database
-from rbfrag.db.location import data_place
+from rbfrag.db.location import REFERENCE, data_place
 from rbfrag.db.model_file import ModelRow
 from rbfrag.db.models import load_model, names_of_models, save_model, store_dependence
+from rbfrag.db.motion_spectra import stored_spectra
+from rbfrag.db.queries import combination_table, recordings_of_motions
 from rbfrag.db.rows import Selection
 from rbfrag.errors import FitError, InputError, ModelError, RbfragError, UnknownFieldError
-from rbfrag.fragility.fit.data import CERTIFIED, FitSource, fit_data, read_source
+from rbfrag.fragility.completion import Regression
+from rbfrag.fragility.fit.completions import MotionTable, ordinates_by_motion, regress
+from rbfrag.fragility.fit.data import (
+    CERTIFIED,
+    FitSource,
+    fit_data,
+    motions_of,
+    read_source,
+)
 from rbfrag.fragility.fit.fitting import FitOptions, Fitted, fit_source
 from rbfrag.fragility.fit.fitting import fit as fit_model
 from rbfrag.fragility.fit.report import FitReport
@@ -32,6 +44,12 @@ from rbfrag.results.result import ResultList, TextLine, TextTable
 
 if TYPE_CHECKING:
     from sqlalchemy import Connection
+
+OF_BUILT_IN = Diagnostic(
+    "the spectral velocity is completed from the motions of the built-in data set: the database of "
+    "the model has too few motions with response spectra",
+    "model_choice",
+)
 
 NOT_STORED = Diagnostic(
     "the fit is of the built-in data set, which is read only: the model is not stored; name a "
@@ -53,7 +71,7 @@ def fit(
             folder, or else the built-in data, which are read only: the model is not stored.
         replace: replace a stored model of the same name.
         kind: what the blocks do: any kind that campaigns store; ``toppling`` if left out.
-        term: name of the intensity term, such as ``pgv``, ``sa10`` or ``xp``; there is no default.
+        term: name of the intensity term, such as ``pgv``, ``sa`` or ``xp``; there is no default.
         method: one of those of the kind (docs/theory/fragility.md); None for the one that predicts
             earthquakes left out best with this term: ``details["why_method"]`` says why.
         suite: suite of motions to fit; None for all motions.
@@ -140,6 +158,31 @@ def with_dependence(row: ModelRow, db: str | PathLike[str] | None) -> ModelRow:
     return estimated
 
 
+def regression_of(
+    row: ModelRow, used: tuple[str, ...], db: str | PathLike[str] | None
+) -> tuple[Regression | None, tuple[Diagnostic, ...]]:
+    """Return the regression of a model's spectral velocity on measures that it stores none for.
+
+    Where the database has too few motions with response spectra, that of the built-in data answers,
+    and a note says so.
+
+    Args:
+        used: the measures.
+        db: the database that the model is stored in.
+    """
+    velocity = method_named(row.method).forms[row.term].velocity
+    assert velocity is not None
+    events = cast("list[str]", row.diagnostics.get("fitted_events", []))
+    for place, notes in ((db, ()), (REFERENCE, (OF_BUILT_IN,))):
+        try:
+            with opened_database(place, read_only=True) as engine, engine.connect() as connection:
+                motions = stored_motions(connection, row, events)
+            return regress(velocity, used, motions), notes
+        except RbfragError:
+            continue
+    return None, ()
+
+
 State = Literal["unchanged", "changed", "no data", "unreadable"]
 
 
@@ -211,6 +254,19 @@ def source_of(connection: Connection, row: ModelRow) -> FitSource:
     block = method_named(row.method).block
     source = read_source(connection, block, kind=row.kind, **selection_of(row))
     return dataclasses.replace(source, narrow=narrow_of(row))
+
+
+def stored_motions(connection: Connection, row: ModelRow, events: list[str]) -> MotionTable:
+    """Return the motions of the fit of a stored model."""
+    table = combination_table(connection, kind=row.kind, **selection_of(row))
+    recordings = recordings_of_motions(connection)
+    source = FitSource.of_table(table)
+    source = dataclasses.replace(
+        source,
+        recording=np.array([recordings[number] for number in table.motion_id.tolist()]),
+        spectra=ordinates_by_motion(stored_spectra(connection), table.motion_id),
+    )
+    return motions_of(source, method_named(row.method).block, events)
 
 
 def narrow_of(row: ModelRow) -> float:

@@ -63,8 +63,8 @@ def capacity_method(
         ),
         link=method.NORMAL,
         forms={
-            "pgv_pga_m": method.Form((*_PARAMETERS, "b_m"), pgv_pga_m, 0, (at_rest,)),
-            "pgv_pga": method.Form(_PARAMETERS, pgv_pga, 0, (at_rest,)),
+            "pgv_pga_m": method.Form((*_PARAMETERS, "b_m"), pgv_pga_m, (at_rest,)),
+            "pgv_pga": method.Form(_PARAMETERS, pgv_pga, (at_rest,)),
         },
         meaning=f"probability that the block {moves}",
         fit="outcomes",

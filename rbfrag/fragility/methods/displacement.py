@@ -102,24 +102,24 @@ METHOD = method.Method(
     link=method.NORMAL,
     forms={
         "pgv_pga": method.Form(
-            ("c", "b1", "b2", "s0", "s1"), _eta(lambda _, __: ()), 0, (BLOCK.at_rest,),
+            ("c", "b1", "b2", "s0", "s1"), _eta(lambda _, __: ()), (BLOCK.at_rest,),
             start=(0.6, 0.9, 3.7, -0.6, 0.9),
             advice="without magnitude, P is overestimated below M 6.4 and underestimated from "
             "M 7.5: give the magnitude",
         ),
         "pgv_pga_m": method.Form(
             ("c", "b1", "b2", "b_magnitude", "s0", "s1"),
-            _eta(lambda v, _: (v["magnitude"] - 6.5,)), 0, (BLOCK.at_rest,),
+            _eta(lambda v, _: (v["magnitude"] - 6.5,)), (BLOCK.at_rest,),
             start=(0.2, 0.8, 4.0, 0.4, -0.8, 1.4),
         ),
         "pgv_pga_ia": method.Form(
             ("c", "b1", "b2", "b_arias", "s0", "s1"),
             _eta(lambda v, ns: (ns.log(v["arias_m_s"] / (v["pgv_m_s"] * v["pgv_m_s"])),)),
-            0, (BLOCK.at_rest,),
+            (BLOCK.at_rest,),
             start=(-0.9, 1.2, 2.7, 0.7, -0.8, 1.0),
         ),
         "pgv": method.Form(
-            ("c", "b1", "b2", "ln_kappa", "s0"), _pgv, 0, start=(2.9, 0.2, 2.7, -3.5, 0.4),
+            ("c", "b1", "b2", "ln_kappa", "s0"), _pgv, start=(2.9, 0.2, 2.7, -3.5, 0.4),
         ),
     },
     meaning="probability that the block slides further than the displacement",

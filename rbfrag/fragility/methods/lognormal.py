@@ -24,7 +24,7 @@ def _eta(b: Parameters, v: Values, ns: ArrayNamespace) -> LinearPredictor:
 
 
 _FORM = method.Form(
-    ("ln_median", "slope", "ln_sigma", "m_minus_1"), _eta, 5,
+    ("ln_median", "slope", "ln_sigma", "m_minus_1"), _eta,
     terms=("1", r"\ln x", "", r"\ln p"), equation=r"(<sum> - \ln y)/<exp ln_sigma>",
 )  # fmt: skip
 

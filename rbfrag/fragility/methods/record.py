@@ -1,7 +1,7 @@
-"""The method ``record``: outcomes, logistic in ln(X(p)/y) and in the strength of the motion.
+"""The method ``record``: outcomes, probit in ln(X(p)/y) and in the strength of the motion.
 
     eta = h(p) [b0 + b1 ln(X(p)/y) + b2 ln s],   s = p X(p)/(PGA g),   h(p) = p^.18
-    P = 1/(1 + exp(-eta)), 0 where y >= X(p) or k_r >= PGA
+    P = Φ(eta), 0 where y >= X(p) or k_r >= PGA
 
 (6) of docs/theory/fragility.md.
 """
@@ -22,10 +22,10 @@ def _eta(b: Parameters, v: Values, ns: ArrayNamespace) -> LinearPredictor:
 METHOD = method.Method(
     name="record",
     block=method.TOPPLING_BLOCK,
-    link=method.LOGIT,
+    link=method.NORMAL,
     forms={
         "xp": method.Form(
-            ("b0", "b_ln_xp_over_y", "b_ln_s"), _eta, 0,
+            ("b0", "b_ln_xp_over_y", "b_ln_s"), _eta,
             (method.ABOVE_SPECTRUM, method.NOT_LIFTED), size_factor=method.SizeFactor(0.18),
             terms=("1", r"\ln(x/y)", r"\ln s"), where=r"s = p\,x/(\mathrm{PGA}\,g)",
         )

@@ -68,11 +68,11 @@ def _doubts(b: Parameters, v: Values, ns: ArrayNamespace) -> Iterator[tuple[Any,
 
 
 _LINE = method.Form(
-    ("c0", "c1", "v0", "v1"), _eta, 6,
+    ("c0", "c1", "v0", "v1"), _eta,
     terms=("1", "x", "", ""), equation=r"(<sum> - y)/\sigma", where=r"\sigma^2 = <v0><+v1>\,x",
 )  # fmt: skip
 _QUADRATIC = method.Form(
-    ("c0", "c1", "v0", "v1", "v2"), _eta, 6,
+    ("c0", "c1", "v0", "v1", "v2"), _eta,
     terms=("1", "x", "", "", ""), equation=r"(<sum> - y)/\sigma",
     where=r"\sigma^2 = <v0><+v1>\,x<+v2>\,x^2",
 )  # fmt: skip

@@ -70,13 +70,13 @@ def test_rows_without_magnitude_are_left_out_and_told() -> None:
 
 
 def test_fits_of_rocking_read_two_factors_on_restitution_and_blocks_up_to_one_g() -> None:
-    source = drawn_outcomes("bounded", "pgv_pga", TRUTH["bounded", "pgv_pga"])
+    source = drawn_outcomes("toppling", "pgv_pga", TRUTH["toppling", "pgv_pga"])
     n = source.table.p2.size
     factor = np.resize([1.0, 0.95, 0.9, 0.8], n)
     strong = replace(
         source, of_block={"restitution_factor": factor}, k_over_pga=4.0 * source.k_over_pga
     )
-    data = fit_data(strong, method_named("overturning"), TERMS["pgv_pga"])
+    data = fit_data(strong, method_named("rocking"), TERMS["pga"])
     assert set(factor[data.combination]) == {1.0, 0.9}
     kr = data.grid("kr")
     assert kr.max() > 1.0

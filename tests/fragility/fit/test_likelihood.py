@@ -8,9 +8,9 @@ from scipy.optimize import minimize
 
 from rbfrag.fragility.fit.likelihood import Binomial, fit_by_statsmodels, maximise, most_likely
 from rbfrag.fragility.fit.result import cr3, jackknife_steps, sandwich
-from rbfrag.fragility.method import LOGIT, LOGLOG, arrays
+from rbfrag.fragility.method import LOGIT, NORMAL, arrays
 
-ALL = [LOGIT, LOGLOG]
+ALL = [LOGIT, NORMAL]
 
 
 def drawn(link, seed=1, events=20, per_event=30):

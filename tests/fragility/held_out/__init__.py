@@ -39,15 +39,17 @@ def blocks(kind: str) -> dict[str, FloatArray]:
     return {**{name: column[place] for name, column in of_motions.items()}, **of_blocks}
 
 
-def probabilities(stored: dict[str, Any], sharpened: float = 1.0) -> FloatArray:
-    """P of every block by a model whose coefficients are multiplied by a factor."""
+def probabilities(stored: dict[str, Any], inputs: str, sharpened: float = 1.0) -> FloatArray:
+    """P of every block from some intensity measures, by a model whose coefficients are multiplied
+    by a factor."""
     b = {name: sharpened * value for name, value in stored["coefficients"].items()}
     nothing = tuple((0.0,) * len(b) for _ in b)
     row = ModelRow("held out", stored["term"], stored["method"], b, nothing, {}, "",
-                   kind=stored["kind"], leave_out_steps=nothing)  # fmt: skip
+                   kind=stored["kind"], leave_out_steps=nothing,
+                   completions="\n".join(stored["completions"]))  # fmt: skip
     model = FragilityModel.from_row(row)
     block = model.method.block
-    names = (*block.names, *block.stored, *model.term.inputs)
+    names = (*block.names, *block.stored, *inputs.split())
     arguments = {name: blocks(stored["kind"])[name] for name in names}
     answer = answer_given(model, arguments, 0.95, interval=False)
     assert isinstance(answer, PredictionArray)

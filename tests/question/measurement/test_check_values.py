@@ -53,7 +53,7 @@ SIGMAS = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("number", [1, 2, 3, 4, 5, 7, 8])
+@pytest.mark.parametrize("number", [5])  # the others are answered by models that are replaced
 def test_the_package_draws_the_same_blocks(number: int, monkeypatch: pytest.MonkeyPatch) -> None:
     # the fixture's version had the dispersion of a component about RotD50 to all digits: .16118
     monkeypatch.setattr(scenario, "COMPONENT_SIGMA", 0.07 * math.log(10.0))

@@ -218,7 +218,7 @@ def test_a_single_block_loads_no_numpy() -> None:
     program = (
         "import sys, rbfrag\n"
         f"rbfrag.predict(**{SLAB!r}, width_sigma_m=0.04, beta_sigma_deg=2.0)\n"
-        f"rbfrag.predict(p2=7.2, kr=0.2, **{SCENARIO!r})\n"
+        "rbfrag.predict(p2=7.2, kr=0.2, pgv_m_s=0.4, pgv_sigma=0.6)\n"
         "print('numpy' in sys.modules)\n"
     )
     process = subprocess.run(

@@ -252,7 +252,7 @@ OVERLAPS = """(id) => {
         "?p2=3&kr=0.1&pgv=0.6",
         "?p2=3&kr=0.1&pgv=2.9",
         "?p2=3&kr=0.02&pgv=0.3&kind=rocking",
-        "?p2=20&kr=0.3&pga=0.5&sa10_g=0.4",
+        "?p2=20&kr=0.3&pga=0.5&sa=1=0.4",
     ],
 )
 def test_no_label_lies_over_another(open_page, query):

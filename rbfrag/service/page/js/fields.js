@@ -90,7 +90,7 @@ export function isHalfTyped(input) {
   if (document.activeElement !== input || input.inputMode === "") return false;
   const text = input.value.trim();
   const nothing = isAboveZero(input.id) && /^\+?(0+[.,]?0*|[.,]0*)$/.test(text);
-  return nothing || /(^|[+-])\.$|[e+,-]$/i.test(text);
+  return nothing || /(^|[+-])\.$|[e+,=:-]$/i.test(text);
 }
 
 /**

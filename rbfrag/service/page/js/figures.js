@@ -6,11 +6,11 @@ import { designChart } from "./chart.js";
 import { fragilityCurve } from "./curve.js";
 import { latest } from "./latest.js";
 import { modelNamed } from "./models.js";
-import { fromField, quantity } from "./numbers.js";
+import { quantity } from "./numbers.js";
 import { byId } from "./page.js";
 import { percent } from "./percent.js";
 import { planeOf } from "./plane.js";
-import { MEASURES } from "./question.js";
+import { measuresOf } from "./question.js";
 import { askCurve, askGrid } from "./service.js";
 import { writeText } from "./subscripts.js";
 import { quantityNamed } from "./vocabulary.js";
@@ -45,9 +45,7 @@ export function figures(moved, failed) {
 
   const drawGrid = latest(
     async (/** @type {Answered} */ { question, answer, plane: on, failing, present }) => {
-      const others = ["restitution", ...MEASURES]
-        .filter((name) => name !== on.across)
-        .map((name) => question.values[name]);
+      const others = [question.values.restitution, othersOf(question, on)];
       const key = JSON.stringify([answer.model, on, failing.numbers.restitution, others]);
       try {
         if (key !== gridShown) chart.showGrid(await askGrid(on, answer.model, failing, question));
@@ -92,8 +90,9 @@ export function figures(moved, failed) {
       showSensitivity(model?.sensitive_share ?? 0);
       const { numbers } = failing;
       const domain = model?.domain ?? {};
-      plane = planeOf(answer, numbers, question.values, domain, held ? plane : null);
-      const x = fromField(question.values[plane.across]);
+      const measures = measuresOf(question.values);
+      plane = planeOf(answer, numbers, measures, domain, held ? plane : null);
+      const x = measures[plane.across] ?? NaN;
       const { kr } = numbers;
       const { probability } = answer;
       // the chart is about strength in rotation
@@ -158,13 +157,18 @@ function showCaption(figure, error = "") {
   byId(`${figure}-error`).textContent = error;
 }
 
+/** The measures that do not run across, by name.
+ * @type {(question: Question, plane: Plane) => [string, number][]} */
+function othersOf(question, plane) {
+  return Object.entries(measuresOf(question.values)).filter(([name]) => name !== plane.across);
+}
+
 /** Values for which the chart is drawn.
  * @type {(question: Question, plane: Plane) => string} */
 function fixedValues(question, plane) {
-  const names = MEASURES.filter((name) => name !== plane.across && question.values[name] !== "");
-  const held = names.map((name) => {
+  const held = othersOf(question, plane).map(([name, value]) => {
     const { symbol, unit } = quantityNamed(name);
-    return `${symbol} = ${quantity(fromField(question.values[name]), unit)}`;
+    return `${symbol} = ${quantity(value, unit)}`;
   });
   return [`p² = ${quantity(plane.p2, "1/s²")}`, ...held].join(", ");
 }

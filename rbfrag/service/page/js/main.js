@@ -10,7 +10,7 @@ import { addressOf, fromAddress, showAddress } from "./link.js";
 import { offerModelsOf } from "./models.js";
 import { forField, fromField } from "./numbers.js";
 import { byId, labelled } from "./page.js";
-import { USUAL_PHI } from "./question.js";
+import { measuresOf, USUAL_PHI, withMeasure } from "./question.js";
 import { recordPanel } from "./record_panel.js";
 import * as service from "./service.js";
 import { blockTable } from "./table.js";
@@ -64,17 +64,16 @@ function fieldsChanged(now, shapeWas, whole) {
 
 /** @type {(across: string, x: number, kr: number | null) => void} */
 function pointMoved(across, x, kr) {
-  /** @type {Record<string, string>} */
-  const values = { [across]: forField(x) };
+  const values = withMeasure(question.values, across, x);
   if (kr !== null) values.kr = forField(kr);
-  sheets.movePoint(fromField(values[across]), kr === null ? null : fromField(values.kr));
+  sheets.movePoint(measuresOf(values)[across], kr === null ? null : fromField(values.kr));
   set(values);
 }
 
 /** A step starts from what the fields say, even where that is not answered yet.
  * @type {(across: string, ratioOfX: number, ratioOfKr: number) => void} */
 function pointStepped(across, ratioOfX, ratioOfKr) {
-  const x = fromField(question.values[across]) * ratioOfX;
+  const x = measuresOf(question.values)[across] * ratioOfX;
   const kr = ratioOfKr === 1 ? null : fromField(question.values.kr) * ratioOfKr;
   if (x > 0 && (kr === null || kr > 0)) pointMoved(across, x, kr);
 }

@@ -1,21 +1,20 @@
 /** The plane of the design chart: which measure runs across, which values are shown and asked. */
 
-import { fromField, ratios } from "./numbers.js";
+import { ratios } from "./numbers.js";
 import { quantityNamed } from "./vocabulary.js";
 
 /**
- * @typedef {"pgv" | "pga" | "pgd" | "sa03_g" | "sa10_g" | "sa30_g"} Across the measure that runs across
+ * @typedef {string} Across the measure that runs across: pgv, pga, pgd or one such as sa(1)
  * @typedef {{across: Across, x: [number, number], y: [number, number], perKr: number, p2: number,
- *   toIntensity: number, xEdges: number[], yEdges: number[]}} Plane
+ *   xEdges: number[], yEdges: number[]}} Plane
  *   x and y are the ranges shown, y being the toppling velocity [m/s]; perKr is y over k_r at this
- *   p2, toIntensity the model's intensity over x; the edges are ends of the fitted ranges
+ *   p2; the edges are ends of the fitted ranges
  */
 
-const SA = [0.03, 3];
-const PLAIN = {
-  ...{ pgv: [0.05, 3], pga: [0.03, 3], pgd: [0.003, 3] },
-  ...{ sa03_g: SA, sa10_g: SA, sa30_g: SA },
-};
+/** @type {Record<string, [number, number]>} */
+const PLAIN = { pgv: [0.05, 3], pgd: [0.003, 3] };
+/** @type {[number, number]} */
+const PLAIN_ACCELERATION = [0.03, 3];
 const PLAIN_Y = [0.02, 3];
 const MARGIN = 1.35;
 const BEYOND = 1.06;
@@ -42,27 +41,27 @@ export function labelOf(across) {
  * intensity over the measure that was asked.
  * @param {any} answer of /v1/predict
  * @param {Record<string, number>} block what predictions read of it: p2 and kr of one that topples
- * @param {Record<string, string>} measures
+ * @param {Record<string, number>} measures by name
  * @param {Record<string, [number, number]>} domain of the model, by variable
  * @param {Plane | null} before the plane whose ranges stay, while the point is moved; else null
  * @returns {Plane}
  */
 export function planeOf(answer, block, measures, domain, before) {
-  const across = acrossOf(answer.term);
-  const x = fromField(measures[across]);
-  const toIntensity = x > 0 ? answer.intensity_m_s / x : NaN;
-  const xEdges = (domain.intensity_m_s ?? []).map((v) => v / toIntensity);
+  const across = acrossOf(answer, measures);
+  const x = measures[across] ?? NaN;
+  // the intensity of these terms is in proportion to the measure that they begin with
+  const perX = answer.term.startsWith(across) ? answer.intensity_m_s / x : NaN;
+  const xEdges = (domain.intensity_m_s ?? []).map((v) => v / perX);
   if (across === "pgv" && answer.pgv_over_pga_s) {
-    const perX = answer.pgv_over_pga_s / x;
-    xEdges.push(...(domain.pgv_over_pga_s ?? []).map((v) => v / perX));
+    const ratioPerX = answer.pgv_over_pga_s / x;
+    xEdges.push(...(domain.pgv_over_pga_s ?? []).map((v) => v / ratioPerX));
   }
   return {
     across,
-    x: around(before?.across === across ? before.x : PLAIN[across], x),
+    x: around(before?.across === across ? before.x : (PLAIN[across] ?? PLAIN_ACCELERATION), x),
     y: around(before?.y ?? PLAIN_Y, answer.y_m_s),
     perKr: answer.y_m_s / block.kr,
     p2: block.p2,
-    toIntensity,
     xEdges: xEdges.filter((v) => v > 0 && Number.isFinite(v)),
     yEdges: [...(domain.y_m_s ?? [])],
   };
@@ -109,16 +108,16 @@ function lines([low, high], edges, count) {
 }
 
 /**
- * The measure that a term's intensity is of.
- * @param {string} term
+ * The measure that runs across: PGV where the model uses it, else the first that it uses.
+ * @param {any} answer of /v1/predict
+ * @param {Record<string, number>} measures by name
  * @returns {Across}
  */
-function acrossOf(term) {
+function acrossOf({ term, kind }, measures) {
   if (term.startsWith("pgd")) return "pgd";
-  if (term.startsWith("pgv")) return "pgv";
-  if (/(^|_)sa10(_|$)/.test(term)) return "sa10_g";
-  if (/^sa[0-9]/.test(term)) return /** @type {Across} */ (`${term}_g`);
-  return "pga";
+  // PGV is optional in the model of PGA of free-standing blocks
+  if (term.startsWith("pgv") || (kind === "rocking" && "pgv" in measures)) return "pgv";
+  return (term === "sa" && Object.keys(measures).find((name) => name.startsWith("sa("))) || "pga";
 }
 
 /**

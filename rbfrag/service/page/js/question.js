@@ -1,6 +1,6 @@
 /** What the reader asks: block, shaking and model, as texts named like the options. */
 
-import { plain } from "./numbers.js";
+import { forField, fromField, plain } from "./numbers.js";
 
 /**
  * @typedef {"rectangle" | "numbers" | "angles" | "fractures"} Shape how the block is given
@@ -32,7 +32,7 @@ const OWN_FIELDS = /** @type {[Shape, string[]][]} */ ([
 ]);
 
 /** Of the shaking, what stands in the part of the form that is closed at first. */
-export const FURTHER = ["tm", "pgd", "sa03_g", "sa10_g", "sa30_g", "arias", "magnitude"];
+export const FURTHER = ["tm", "pgd", "sa", "arias", "magnitude"];
 
 export const MEASURES = ["pgv", "pga", ...FURTHER];
 
@@ -62,9 +62,7 @@ export const DEFAULTS = {
   pga: "",
   tm: "",
   pgd: "",
-  sa03_g: "",
-  sa10_g: "",
-  sa30_g: "",
+  sa: "",
   arias: "",
   magnitude: "",
   model: "",
@@ -85,6 +83,65 @@ export function only(values, names) {
   return Object.fromEntries(
     names.filter((name) => values[name] !== "").map((name) => [name, values[name]]),
   );
+}
+
+/** The name of a spectral acceleration: sa(1) for that at 1 s. */
+const SPECTRAL = /^sa\((.+)\)$/;
+
+/**
+ * Spectral accelerations by period, as texts: of "0.3=0.9 1=0.5" those at 0.3 and 1 s.
+ * @param {string} text
+ * @returns {Values}
+ */
+export function spectrumIn(text) {
+  const items = text.split(/\s+/).filter(Boolean);
+  return Object.fromEntries(
+    items.map((item) => item.split(/[=:]/)).map(([period, value = ""]) => [String(Number(period)), value]),
+  );
+}
+
+/**
+ * The measures of a question by name, each spectral acceleration by its own.
+ * @param {Values} values
+ * @returns {Record<string, number>}
+ */
+export function measuresOf(values) {
+  const { sa = "", ...others } = only(values, MEASURES);
+  const texts = Object.entries(spectrumIn(sa)).map(([period, text]) => [`sa(${period})`, text]);
+  return Object.fromEntries(
+    [...Object.entries(others), ...texts].map(([name, text]) => [name, fromField(text)]),
+  );
+}
+
+/**
+ * The values in which one measure is another.
+ * @param {Values} values
+ * @param {string} name
+ * @param {number} measure
+ * @returns {Values}
+ */
+export function withMeasure(values, name, measure) {
+  const period = SPECTRAL.exec(name)?.[1];
+  if (period === undefined) return { ...values, [name]: forField(measure) };
+  const spectrum = Object.entries({ ...spectrumIn(values.sa), [period]: forField(measure) });
+  spectrum.sort(([one], [other]) => Number(one) - Number(other));
+  return { ...values, sa: spectrum.map((item) => item.join("=")).join(" ") };
+}
+
+/**
+ * Measures as the body of a request has them: spectral accelerations by period.
+ * @param {Record<string, any>} measures by name
+ * @returns {Record<string, any>}
+ */
+export function sentMeasures(measures) {
+  /** @type {Record<string, any>} */
+  const sent = {};
+  for (const [name, value] of Object.entries(measures)) {
+    const period = SPECTRAL.exec(name)?.[1];
+    if (period === undefined) sent[name] = value;
+    else sent.sa = { ...sent.sa, [period]: value };
+  }
+  return sent;
 }
 
 /**

@@ -3,7 +3,15 @@
 import { get, post, upload } from "./ask.js";
 import { fromField } from "./numbers.js";
 import { columnsOf, rowsOf, stepsOf } from "./plane.js";
-import { blockOf, ERROR_FIELDS, MEASURES, MODEL_FIELDS, only } from "./question.js";
+import {
+  blockOf,
+  ERROR_FIELDS,
+  MEASURES,
+  measuresOf,
+  MODEL_FIELDS,
+  only,
+  sentMeasures,
+} from "./question.js";
 import { SIZES, spectrumOf } from "./record.js";
 
 /**
@@ -66,8 +74,7 @@ export async function askGrid(plane, model, failing, question) {
   const across = ys.flatMap(() => xs.map(rounded));
   const kr = ys.flatMap((y) => xs.map(() => rounded(y / plane.perKr)));
   const answer = await post("v1/predict", {
-    ...{ ...fixed(failing, question), kr },
-    [plane.across]: across,
+    ...{ ...fixed(failing, question, { [plane.across]: across }), kr },
     model,
   });
   return { xs, ys, probability: answer.probability, in_domain: answer.in_domain };
@@ -84,8 +91,7 @@ export async function askGrid(plane, model, failing, question) {
 export async function askCurve(plane, model, failing, question) {
   const xs = stepsOf(plane);
   const answer = await post("v1/predict", {
-    ...fixed(failing, question),
-    [plane.across]: xs.map(rounded),
+    ...fixed(failing, question, { [plane.across]: xs.map(rounded) }),
     model,
     level: fromField(question.values.level),
     ...(question.values.sites === "" ? {} : { sites: fromField(question.values.sites) }),
@@ -138,12 +144,14 @@ function optionsOf(kind) {
  * What is alike in all questions of a figure: block, kind and measures, as numbers.
  * @param {Failing} failing
  * @param {Question} question
+ * @param {Record<string, number[]>} across the measure that is not, by name
  */
-function fixed({ kind, numbers }, { values }) {
+function fixed({ kind, numbers }, { values }, across) {
   const { beta_deg: beta, ...block } = numbers;
-  const texts = Object.entries(only(values, [...optionsOf(kind), ...MEASURES]));
-  const known = Object.fromEntries(texts.map(([name, text]) => [name, fromField(text)]));
-  return { ...block, ...(beta === undefined ? {} : { beta }), ...known, kind };
+  const texts = Object.entries(only(values, optionsOf(kind)));
+  const options = Object.fromEntries(texts.map(([name, text]) => [name, fromField(text)]));
+  const measures = sentMeasures({ ...measuresOf(values), ...across });
+  return { ...block, ...(beta === undefined ? {} : { beta }), ...options, ...measures, kind };
 }
 
 /** @param {number} value */

@@ -44,11 +44,14 @@ async function load() {
 }
 
 /**
- * The quantity of a parameter of requests.
+ * The quantity of a parameter of requests, or a spectral acceleration by its name: sa(1).
  * @param {string} parameter
  */
 export function quantityNamed(parameter) {
-  return quantities.get(parameter) ?? UNKNOWN;
+  const period = /^sa\((.+)\)$/.exec(parameter)?.[1];
+  if (period === undefined) return quantities.get(parameter) ?? UNKNOWN;
+  const axis = `spectral acceleration, SA(${period} s), 5 % damping`;
+  return { ...UNKNOWN, axis, unit: "g", symbol: `SA(${period} s)` };
 }
 
 /**
