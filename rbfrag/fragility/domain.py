@@ -15,6 +15,7 @@ from typing import Any, NamedTuple
 
 from rbfrag.errors import ModelError
 from rbfrag.fragility.confidence import packed
+from rbfrag.fragility.measures import TERMS
 from rbfrag.fragility.method import ArrayNamespace
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.results.numbers import exact_percent
@@ -30,9 +31,7 @@ MARGIN = 2.0
 def _name_of(value: str) -> str:
     """Return the name of a quantity in a ratio: a measure, a spectral velocity, p of the block."""
     if value not in MEASURES:
-        return (
-            "spectral velocity at the block's periods" if value == "velocity_m_s" else "block's p"
-        )
+        return TERMS["sa"].title if value == "velocity_m_s" else "block's p"
     return MEASURES[value].imt or MEASURES[value].title or QUANTITIES[value].symbol
 
 

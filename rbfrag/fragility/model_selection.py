@@ -221,16 +221,25 @@ def unused_measures(model: FragilityModel, names: Collection[str]) -> tuple[Diag
         if name not in ABOUT_SCATTER or SCATTERED.get(name, read[0]) not in read
     ]
     uses = " and ".join(dict.fromkeys(map(input_of, read)))
-    texts = []
+    alone = [
+        name for name in unused
+        if input_of(name) == "sa_sigma" and name.removesuffix("_sigma") not in names
+    ]  # fmt: skip
+    unused = [name for name in unused if name not in alone]
+    texts = [f"{name} was not used: {name.removesuffix('_sigma')} is not given" for name in alone]
     if model.form.velocity is not None and ("pga_g" in read or spectral_names(read)):
         # SA is used, but not at these periods
         spectral = spectral_names(unused)
-        unused = [name for name in unused if name not in spectral]
+        deviations = {f"{name}_sigma" for name in spectral}
+        unused = [name for name in unused if name not in spectral and name not in deviations]
         short = [name for name in spectral if (period_of(name) or 0.0) < SPECTRUM_PERIODS_S[0]]
         if short and "pga_g" in read:
             texts.append("spectral accelerations below 0.1 s were not used: PGA stands for them")
         if len(short) < len(spectral):
-            texts.append("spectral accelerations at further periods were not used: 21 suffice")
+            texts.append(
+                "spectral accelerations at other periods were not used: those at the 21 periods of "
+                "the fitted spectra suffice"
+            )
     texts += [f"{name} was not used: model {model.name} uses {uses}"
               for name in dict.fromkeys(map(input_of, unused))]  # fmt: skip
     hints = [Diagnostic(model.form.hint, "model_choice")] if texts and model.form.hint else []

@@ -20,7 +20,14 @@ from rbfrag.errors import InputError
 from rbfrag.fragility.completion import MOMENTS
 from rbfrag.fragility.confidence import Quantiles
 from rbfrag.fragility.domain import RATIOS
-from rbfrag.fragility.measures import AMPLIFIED, CREDIBLE, HIGHEST, LOWEST, most_over_pga
+from rbfrag.fragility.measures import (
+    AMPLIFIED,
+    CREDIBLE,
+    HIGHEST,
+    LOWEST,
+    TERMS,
+    most_over_pga,
+)
 from rbfrag.fragility.method import ArrayNamespace, BlockParameters, arrays
 from rbfrag.fragility.model import LEAST, Answer, FragilityModel
 from rbfrag.results.diagnostic import Diagnostic
@@ -45,7 +52,7 @@ def _unit(name: str) -> str:
 def _word(name: str) -> str:
     """Return the name of an input, or of a value that is derived the label."""
     if name == "velocity_m_s":
-        return "spectral velocity at the block's periods"
+        return TERMS["sa"].title
     return name if name in INPUTS or name not in QUANTITIES else QUANTITIES[name].noun
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import os
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
 from scipy.special import ndtr
@@ -103,18 +103,23 @@ def reject_unlike(curves: Sequence[HazardCurve]) -> None:
     """Reject an empty list of curves, and curves of several measures or sites."""
     if not curves:
         raise InputError("no hazard curve: give one or more")
+    reject_several_measures(curves)
+    sites = list(dict.fromkeys(curve.place for curve in curves if curve.place))
+    if len(sites) > 1:
+        raise InputError(
+            f"the curves are of {len(sites)} sites ({sites[0]}; {sites[1]}; …): the blocks are "
+            "at one site: choose it by number or name"
+        )
+
+
+def reject_several_measures(curves: Iterable[HazardCurve]) -> None:
+    """Reject curves of several intensity measures."""
     measures = list(dict.fromkeys(curve.imt for curve in curves))
     if len(measures) > 1:
         raise InputError(
             f"the curves are of {', '.join(measures)}: give curves of one measure, or choose it "
             "with imt",
             fields=("imt",),
-        )
-    sites = list(dict.fromkeys(curve.place for curve in curves if curve.place))
-    if len(sites) > 1:
-        raise InputError(
-            f"the curves are of {len(sites)} sites ({sites[0]}; {sites[1]}; …): the blocks are "
-            "at one site: choose it by number or name"
         )
 
 

@@ -26,6 +26,7 @@ from rbfrag.hazards.branches import (
     curve_name,
     curve_warnings,
     mixture_quantiles,
+    reject_several_measures,
     weighted_quantiles,
 )
 from rbfrag.hazards.curve import (
@@ -211,13 +212,7 @@ def hazard_at_sites(
     """
     level, first = answering.get("level", LEVEL), [curves[0] for curves in sites]
     checked_years(years)
-    measures = sorted({curve.imt for curves in sites for curve in curves})
-    if len(measures) > 1:
-        raise InputError(
-            f"the curves are of {' and '.join(measures)}: give curves of one measure; imt chooses "
-            "it from files with several",
-            fields=("imt",),
-        )
+    reject_several_measures(curve for curves in sites for curve in curves)
     reading = HazardLevel.of(first[0], **meaning)
     by_law = reading.magnitudes_from_g is not None
     pga_alone = (PGA_ALONE,) if reading.name == "pga_g" else ()

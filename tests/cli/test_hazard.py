@@ -430,7 +430,8 @@ def test_curves_of_several_measures_are_no_branches(rejects: Rejects) -> None:
     block = ("--p2", "3", "--kr", "0.1", "--db", REFERENCE)
     for order in (("sa.csv", "pgv.csv"), ("pgv.csv", "sa.csv")):
         message = rejects("hazard", *order, "--weights", "0.5,0.5", *block)
-        assert "the curves are of PGV and SA(0.5): give curves of one measure" in message
+        named = ", ".join("PGV" if name == "pgv.csv" else "SA(0.5)" for name in order)
+        assert f"the curves are of {named}: give curves of one measure" in message
 
 
 def test_a_rate_of_pga_names_a_model_of_the_kind(rejects: Rejects, shell: Shell) -> None:

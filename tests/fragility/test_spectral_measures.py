@@ -123,3 +123,16 @@ def test_a_spectrum_far_above_pga_is_doubted() -> None:
         many = predict([3.0, 3.0], 0.1, **inputs, db=REFERENCE)
         for answer in (single, many):
             assert ("times PGA, as in no record" in " ".join(answer.warnings)) is doubted
+
+
+def test_notes_tell_which_standard_deviations_were_not_used() -> None:
+    inputs = {"pga_g": 0.5, "sa_g": {0.05: 0.6, 1.0: 0.4}}
+    answer = predict(3.0, 0.1, **inputs, sa_sigma={0.05: 0.3, 1.0: 0.3}, db=REFERENCE)
+    certain = predict(3.0, 0.1, **inputs, db=REFERENCE)
+    assert answer.probability != certain.probability
+    texts = " ".join(answer.warnings)
+    assert "below 0.1 s were not used" in texts
+    assert "sa_sigma was not used" not in texts
+    other = predict(3.0, 0.1, **inputs, sa_sigma={2.0: 0.3}, db=REFERENCE)
+    assert other.probability == certain.probability
+    assert "sa(2)_sigma was not used: sa(2) is not given" in " ".join(other.warnings)
