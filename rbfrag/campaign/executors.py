@@ -11,6 +11,7 @@ import os
 import signal
 import socket
 import threading
+import time
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
@@ -33,6 +34,17 @@ CLUSTER = "a cluster"
 QUEUED_PER_WORKER = 2
 """Chunks handed out ahead of each worker process or thread of a cluster: enough to keep it busy,
 little enough for memory."""
+
+CHUNKS_PER_WORKER = 4
+"""Chunks per worker from which the first ones are done without workers, to see how long they take;
+with fewer, a long chunk would hold up the rest."""
+
+TRIAL_S = 1.0
+"""How long to measure before workers are started [s]."""
+
+WORTH_WORKERS_S = 3.0
+"""Time of the rest in this process from which workers are started [s]: the start of each takes a
+second of its processor."""
 
 CONNECT_TIMEOUT_S = 10.0
 """How long to wait for the scheduler to answer [s]."""
@@ -92,14 +104,29 @@ def executor(
         shared: what all chunks have in common: each worker is sent it once.
     """
     if scheduler is None:
-        yield lambda work, chunks: run_locally(
-            run_work,
-            work,
-            min(jobs or os.cpu_count() or 1, chunks),
-            after_a_death=after_a_death,
-            stopped=stopped,
-            shared=shared,
-        )
+
+        def locally(work: Iterator[W], chunks: int) -> Iterator[R]:
+            run = partial(
+                run_locally, run_work, iter(work), after_a_death=after_a_death, stopped=stopped,
+                shared=shared,
+            )  # fmt: skip
+            workers = min(jobs or os.cpu_count() or 1, chunks)
+            times: list[float] = []
+            if jobs is None and 1 < workers <= chunks // CHUNKS_PER_WORKER:
+                begin = time.perf_counter()
+                for result in run(workers=1):
+                    times.append(time.perf_counter() - begin)
+                    yield result
+                    # the first chunk loads or compiles kernels and does not count
+                    spent = sum(times[1:])
+                    rest = spent / max(len(times) - 1, 1) * (chunks - len(times))
+                    if spent > TRIAL_S and rest > WORTH_WORKERS_S:
+                        break
+                    begin = time.perf_counter()  # what the caller does with a result is no work
+            if not stopped():
+                yield from run(workers=min(workers, chunks - len(times)))
+
+        yield locally
         return
     with connected(scheduler) as client:
 

@@ -446,7 +446,8 @@ CONFLICTS: tuple[tuple[tuple[str, ...], tuple[str, ...], str, tuple[str, ...]], 
      ("respond",)),
     (("--polarity",), ("--reverse",), "give one of them", ()),
     (("--slope-azimuth",), ("--polarity", "--reverse"), "it sets the polarity", ()),
-    (("--samples", "--seed", "--plot"), ("--expected",), "curves and samples require draws", ()),
+    (("--samples", "--seed", "--plot", "--jobs", "--scheduler"), ("--expected",),
+     "only samples and their curves use it", ()),
 )  # fmt: skip
 """Options that exclude others, the reason, and the commands where they do; () for all.
 

@@ -7,6 +7,7 @@ so that `rbfrag predict` starts without numba, pandas or matplotlib.
 from __future__ import annotations
 
 import codecs
+import gc
 import os
 import signal
 import sys
@@ -239,6 +240,7 @@ def end_unwritten(error: OSError) -> None:
 def run() -> None:
     """Entry point of the console script."""
     os.environ.setdefault(ONE_THREAD, "1")
+    gc.set_threshold(50_000)  # most objects belong to modules and stay: search them less often
     write_plainly()
     try:
         try:

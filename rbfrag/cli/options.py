@@ -193,7 +193,7 @@ Weights = Annotated[
 
 Jobs = Annotated[
     int | None,
-    typer.Option("--jobs", help="Number of worker processes [default: one per processor]"),
+    typer.Option("--jobs", help="Number of worker processes [default: as many as save time]"),
 ]
 
 Scheduler = Annotated[

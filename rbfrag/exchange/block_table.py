@@ -45,6 +45,7 @@ from rbfrag.vocabulary.quantities import (
     QUANTITIES,
     SHAKING,
     column_of,
+    word_of,
 )
 from rbfrag.vocabulary.spectral import BY_PERIOD
 
@@ -77,6 +78,7 @@ class BlockTable:
         unused: columns that turned out to hold no kind of failure, with their words.
         gaps: rows without water or cohesion where the table has a column of it, by field.
         read: numbers of rows that have been read.
+        common: rows with an empty cell of each field that is given for all rows as well.
     """
 
     name: str
@@ -87,6 +89,7 @@ class BlockTable:
     unused: dict[str, list[str]] = field(default_factory=dict)
     gaps: dict[str, list[int]] = field(default_factory=dict)
     read: list[int] = field(default_factory=list)
+    common: dict[str, list[int]] = field(default_factory=dict)
 
     @property
     def numeric(self) -> frozenset[str]:
@@ -130,12 +133,14 @@ class BlockTable:
             empty = np.isnan(values)
             if cell_faults or not empty.all():
                 self.filled.add(name)
-            if name in ASSUMED:
-                start = sum(self.read)
-                rows = self.gaps.setdefault(name, [])
-                rows.extend((np.flatnonzero(empty) + start).tolist())
+            rows = (np.flatnonzero(empty) + sum(self.read)).tolist()
             is_sigma = "_sigma" in name and name != "gmm_sigma"
             stands_for = 0.0 if is_sigma else IF_EMPTY.get(name)
+            if name in self.common:  # empty cells have the value for all rows
+                self.common[name] += rows
+                stands_for = None
+            elif name in ASSUMED:
+                self.gaps.setdefault(name, []).extend(rows)
             numbers[name] = values if stands_for is None else np.where(empty, stands_for, values)
         self.read.append(len(part.lines))
         return numbers, faults
@@ -160,6 +165,15 @@ class BlockTable:
 
     def text(self, part: TablePart, name: str) -> list[str] | None:
         """Return the texts of rows; None where the table has no column of that field."""
+        cells = self._texts(part, name)
+        if cells is not None and name in self.common:
+            start = sum(self.read) - len(cells)  # the numbers of these rows have been read
+            self.common[name] += [start + i for i, cell in enumerate(cells) if not cell]
+            if any(cells):
+                self.filled.add(name)
+        return cells
+
+    def _texts(self, part: TablePart, name: str) -> list[str] | None:
         if name == "kind":
             return self._kinds(part)
         column = self.header.columns.get(name)
@@ -232,11 +246,27 @@ class BlockTable:
         )
         return (
             *self.file.remarks,
+            *self._cells_before_options(),
             *assumed,
             *self.header.warnings,
             *self.header.ignored(named, used),
             *(Diagnostic(text, "ignored_columns") for text in kinds),
         )
+
+    def _cells_before_options(self) -> Iterator[Diagnostic]:
+        """Yield which rows use a value that is given for all rows: those with an empty cell."""
+        total = sum(self.read)
+        for name, rows in self.common.items():
+            if name not in self.filled:
+                continue
+            common = f"{word_of(name)} given for all rows"
+            column = f"column {self.header.columns[name].header!r}"
+            text = f"{common} is ignored: {column} has a value in every row"
+            if rows:
+                text = (
+                    f"{common} is used for {len(rows):,} of {total:,} rows: {column} is empty there"
+                )
+            yield Diagnostic(text, "option_and_column", fields=(name,), rows=rows)
 
     def check(self, common_fields: Collection[str] = (), kind: str | None = None) -> None:
         """Reject a table that describes no blocks, or has a relevant column that is not used.
@@ -245,6 +275,8 @@ class BlockTable:
             common_fields: fields that are given for all blocks.
             kind: how the blocks fail; None for what they are given by.
         """
+        of_all = {*common_fields} | ({"kind"} if kind is not None else set())
+        self.common.update({name: [] for name in sorted(of_all & {*self.header.columns})})
         present = {*self.header.columns, *common_fields}
         present |= {angle for plane, angle in ANGLES.items() if plane in present}
         self.header.check_unused(self.name, present if kind is None else {*present, "kind"})
@@ -434,7 +466,7 @@ def write_template(path: str | os.PathLike[str]) -> Path:
     column_sheet.append(["column", "description", "other names"])
     spectral = ("sa(1)", "sa(1)_sigma")  # or at any other period
     for name in (*(name for name in quantities.COLUMNS if name not in BY_PERIOD), *spectral):
-        help = quantities.QUANTITIES[name].help(quantities.word_of)
+        help = quantities.QUANTITIES[name].help(word_of)
         column_sheet.append([header_of(name), help, ", ".join(quantities.INPUTS[name].aliases)])
     with written_whole(target, "table") as partial:
         book.save(partial)

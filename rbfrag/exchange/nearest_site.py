@@ -118,6 +118,10 @@ def join_sites(
                 f"site, such as block {block_id}: {pair[0]:.3g} and {pair[1]:.3g} km"
             )
         remarks += [Diagnostic(text, "site_join") for text in texts]
+    elif count > 1 and rest.size < n:
+        site[rest] = -1
+        text = f"site_id is empty, and there are {count} sites: fill it"
+        reasons |= dict.fromkeys(rest.tolist(), text)
     elif count > 1:
         raise InputError(
             f"there are {count} sites, and {rest.size} of {n} blocks have no site: add the column "

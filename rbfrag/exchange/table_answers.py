@@ -241,7 +241,8 @@ def predict_table(
         opened_table(origin, read, texts, sheet=sheet, ignore_columns=ignore_columns) as table,
         ExitStack() as stack,
     ):
-        table.check(inputs, kind)
+        common = {*inputs, *(name for name in SHAKING_TEXTS if question.get(name) is not None)}
+        table.check(common, kind)
         uncertain = not _SCATTER.isdisjoint((*table.header.columns, *inputs))
         columns: tuple[str, ...] = (*ANSWERS, OF_UNCERTAIN) if uncertain else ANSWERS
         fields = {*table.header.columns, *inputs}

@@ -17,6 +17,7 @@ import json
 import math
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
 from operator import mul
 from typing import Any, NamedTuple
@@ -144,6 +145,13 @@ class Completion:
     used: tuple[str, ...]
     regression: Regression | None
 
+    @cached_property
+    def columns(self) -> list[tuple[float, ...]]:
+        """Each coefficient of the regression, and σ last, at all sizes."""
+        assert self.regression is not None
+        columns = zip(*self.regression.coefficients, strict=True)
+        return [*columns, tuple(self.regression.sigma)]
+
     def velocities(self, values: Values, ns: ArrayNamespace) -> dict[str, Any]:
         """Return the median velocity [m/s] and, if it is not exact, its :class:`Moments`."""
         if self.regression is None:
@@ -151,8 +159,7 @@ class Completion:
         over = ln_over(self.velocity, values, ns)
         regressors = regressors_of(self.velocity, self.used, values, over, ns)
         weights = node_weights(values, ns)
-        slopes = [sum(map(mul, weights, column))
-                  for column in zip(*self.regression.coefficients, strict=True)]  # fmt: skip
+        *slopes, sigma = [sum(map(mul, weights, column)) for column in self.columns]
         if self.velocity.over == "pga_g" and "pgv_m_s" in self.used:
             # beyond the top of the parabola the velocity would fall as PGV rises
             falls = slopes[2] < 0.0
@@ -160,7 +167,6 @@ class Completion:
             zeta = regressors[1] - falls * ns.maximum(regressors[1] - top, 0.0)
             regressors = (1.0, zeta, zeta * zeta, *regressors[3:])
         median = ns.maximum(ns.exp(sum(map(mul, slopes, regressors)) + over), _LEAST_M_S)
-        sigma = sum(map(mul, weights, self.regression.sigma))
         return {"velocity_m_s": median, MOMENTS: Moments(sigma, regressors, weights)}
 
     def scatter(self, values: Values, ns: ArrayNamespace) -> tuple[Any, Any, Any]:

@@ -7,10 +7,11 @@ of the fits that each leave an earthquake out. Nothing else widens it. No librar
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache, cached_property, lru_cache
-from itertools import chain
+from itertools import chain, pairwise
 from operator import mul
 from typing import Any, NamedTuple
 
@@ -97,27 +98,37 @@ class ParameterErrors:
         """Return Σ (x·d)² and Σ (x·d)⁴ of single slopes x."""
         if not self.node_steps and len(x.slopes) == len(self.steps[0]):
             return self.step_sums(*x.slopes)
-        slopes = (*x.slopes, *x.node_slopes) if x.node_weights else x.slopes
-        rows = self.steps_at(x.node_weights) if x.node_weights else self.all_steps
+        slopes, rows, node = x.slopes, self.all_steps, 0
+        if x.node_weights:
+            while node < len(x.node_weights) - 2 and x.node_weights[node] <= 0.0:
+                node += 1
+            at_nodes = (w * s for w in x.node_weights[node : node + 2] for s in x.node_slopes)
+            slopes, rows = (*slopes, *at_nodes), self.steps_of_pairs[node]
+        if "numpy" in sys.modules:
+            # the same sums in the same order give the same bits in a third of the time
+            import numpy as np
+
+            steps = self.columns_of_pairs[node] if x.node_weights else self.matrix.T.copy()
+            products = np.add.reduce(steps * np.array(slopes)[:, None])
+            products *= products
+            return sum(products.tolist()), sum((products * products).tolist())
         squares = _squares_of(len(slopes))(rows, *slopes)
         return sum(squares), sum(map(mul, squares, squares))
 
-    def steps_at(self, weights: tuple[float, ...]) -> list[tuple[float, ...]]:
-        """Return the steps of parameters and regression at one size, from the weights of nodes."""
-        if self.last.get("weights") != weights:
-            nodes = [(w, steps) for w, steps in zip(weights, self.node_steps, strict=True) if w]
-            regression = [
-                tuple(sum(w * steps[e][i] for w, steps in nodes) for i in range(len(row)))
-                for e, row in enumerate(self.node_steps[0])
-            ]
-            rows = [(*d, *w) for d, w in zip(self.steps, regression, strict=True)]
-            self.last.update(weights=weights, rows=rows)
-        return list(self.last["rows"])
+    @cached_property
+    def steps_of_pairs(self) -> list[list[tuple[float, ...]]]:
+        """Steps of the parameters and of the regression at two adjacent nodes, for each pair."""
+        return [
+            [(*d, *lower, *upper) for d, lower, upper in zip(self.steps, *both, strict=True)]
+            for both in pairwise(self.node_steps)
+        ]
 
     @cached_property
-    def last(self) -> dict[str, Any]:
-        """The last answer of :meth:`steps_at`: many questions are about one block."""
-        return {}
+    def columns_of_pairs(self) -> Any:
+        """:attr:`steps_of_pairs` by parameter, shape (pairs, parameters, G)."""
+        import numpy as np
+
+        return np.array(self.steps_of_pairs).swapaxes(1, 2).copy()
 
     @cached_property
     def all_steps(self) -> list[tuple[float, ...]]:
@@ -131,26 +142,39 @@ class ParameterErrors:
         """Return Σ (x·d)² and Σ (x·d)⁴ of slopes x that are arrays."""
         import numpy as np
 
-        k, columns = len(x.slopes), np.broadcast_arrays(*x.slopes, *x.node_slopes, *x.node_weights)
-        steps = self.matrix
-        if not x.node_weights:
-            return _sums(steps[:, :k], np.stack(columns))
-        # only two nodes have a weight: blocks between the same two are worked on together
-        slopes, weights = (
-            np.stack(columns[: -len(x.node_weights)]),
-            np.stack(columns[-len(x.node_weights) :]),
-        )
-        m, size = len(x.node_slopes), slopes.shape[1]
-        first = np.minimum(np.argmax(weights > 0.0, axis=0), len(weights) - 2)
-        totals = np.empty((2, size))
-        for node in np.unique(first):
-            chosen = np.flatnonzero(first == node) if (first != node).any() else slice(None)
-            part, at = slopes[:, chosen], weights[node : node + 2, None, chosen]
-            both = (at * part[k:]).reshape(2 * m, -1)
-            start = k + node * m
-            these = np.hstack([steps[:, :k], steps[:, start : start + 2 * m]])
-            totals[:, chosen] = _sums(these, np.concatenate([part[:k], both]))
-        return totals[0], totals[1]
+        forms, mixture, square_weights = self.square_forms
+        k, m = len(x.slopes), len(x.node_slopes)
+        nodes = [i for i, weight in enumerate(x.node_weights) if np.any(weight)]
+        if len(nodes) < len(x.node_weights):  # blocks of one size lie between two nodes
+            forms = forms[:, [*range(k), *(k + i * m + j for i in nodes for j in range(m))]]
+        weights = [x.node_weights[i] for i in nodes]
+        inputs = np.stack(np.broadcast_arrays(*x.slopes, *x.node_slopes, *weights))
+        slopes, node_slopes, node_weights = np.split(inputs, (k, k + m))
+        # BLAS starts threads, which wait for each other, from 2^18 multiplications of a matrix by
+        # a matrix and 9216 of a vector by a matrix: as many columns at a time need fewer
+        largest, ones = forms if mixture is None else mixture, np.ones(len(forms))
+        size = inputs.shape[1]
+        most = max(16, min(2**18 // largest.size, 9_000 // len(forms)) // 16 * 16)
+        width = max(1, min(most, size))
+        count = max(1, min(512, size) // width)  # so few groups at a time stay near the processor
+        step = count * width
+        columns = np.zeros((forms.shape[1], step))
+        groups = columns.reshape(-1, count, width).swapaxes(0, 1)
+        totals = np.empty((2, -(-size // step), count, width))
+        for i, start in enumerate(range(0, size, step)):
+            part, n = slice(start, start + step), min(step, size - start)
+            columns[:k, :n] = slopes[:, part]
+            at_nodes = columns[k:, :n].reshape(len(nodes), m, n)
+            np.multiply(node_weights[:, None, part], node_slopes[:, part], out=at_nodes)
+            squares = forms @ groups
+            squares *= squares
+            np.matmul(square_weights, squares, out=totals[0, i])
+            if mixture is not None:
+                squares = mixture @ squares
+            squares *= squares
+            np.matmul(ones, squares, out=totals[1, i])
+        total, fourths = totals.reshape(2, -1)[:, :size]
+        return total, fourths
 
     def covariance_times(self, gradient: Any) -> Any:
         """Return V g, V of the parameters and the regression at each node, shape (k,).
@@ -173,6 +197,27 @@ class ParameterErrors:
         import numpy as np
 
         return np.array(self.all_steps)
+
+    @cached_property
+    def square_forms(self) -> tuple[Any, Any, Any]:
+        """Return F, B, c with Σ (x·d)² = c·s and Σ (x·d)⁴ = |B s|², s the squares of F x.
+
+        F is the matrix D of the steps and B = 1, stated as None, unless fewer rows do. With
+        D = W R, WᵀW = 1 and z = R x, Σ (x·d)² = |z|², and (x·d)² = (w·z)² is a sum over i ≤ j of
+        a_ij f_ij² with f_ij = z_i + z_j, f_ii = z_i, a_ij = w_i w_j and a_ii = w_i (2 w_i - Σ w).
+        F has the rows f, k(k + 1)/2 of them, and B is the triangle of A = Q B, QᵀQ = 1. Whitening
+        keeps this from cancelling: |z|⁴/G ≤ Σ (x·d)⁴ ≤ |z|⁴.
+        """
+        import numpy as np
+
+        i, j = np.triu_indices(self.size)
+        if 2 * i.size > len(self.steps):
+            return self.matrix, None, np.ones(len(self.steps))
+        w, r = np.linalg.qr(self.matrix)
+        is_square = (i == j)[:, None]
+        pairs = np.where(is_square.T, 2.0 * w[:, i] - w.sum(axis=1)[:, None], w[:, j]) * w[:, i]
+        forms = r[i] + np.where(is_square, 0.0, r[j])
+        return forms, np.linalg.qr(pairs, mode="r"), 1.0 * is_square[:, 0]
 
     @cached_property
     def step_sums(self) -> Callable[..., tuple[float, float]]:
@@ -209,26 +254,9 @@ def _squares_of(size: int) -> Callable[..., list[float]]:
     slopes, row = (",".join(f"{name}{i}" for i in range(size)) for name in ("x", "d"))
     product = "+".join(f"x{i}*d{i}" for i in range(size))
     function: Callable[..., list[float]] = eval(
-        f"lambda rows,{slopes}: [({product})**2 for {row}, in rows]"
+        f"lambda rows,{slopes}: [y*y for {row}, in rows for y in [{product}]]"
     )
     return function
-
-
-def _sums(steps: Any, columns: Any) -> tuple[Any, Any]:
-    """Return Σ (x·d)² and Σ (x·d)⁴ over the rows d of `steps`, of the columns x."""
-    import numpy as np
-
-    # more terms than earthquakes: here the products are faster than the polynomials
-    total, fourths = np.empty((2, columns.shape[1]))
-    # so few at a time stay near the processor, and BLAS starts no threads of its own
-    for start in range(0, columns.shape[1], 512):
-        part = slice(start, start + 512)
-        squares = steps @ columns[:, part]
-        squares *= squares
-        np.add.reduce(squares, axis=0, out=total[part])
-        squares *= squares
-        np.add.reduce(squares, axis=0, out=fourths[part])
-    return total, fourths
 
 
 def packed(covariance: Sequence[Sequence[float]]) -> tuple[float, ...]:

@@ -220,7 +220,8 @@ def model(document: Mapping[str, Any]) -> str:
     from rbfrag.fragility.method import TOPPLING_BLOCK
     from rbfrag.fragility.methods import method_named
 
-    if (term := TERMS.get(document["term"])) is None:  # several models
+    term = TERMS.get(document["term"])
+    if term is None or "," in document["method"]:  # several models
         return str(document["model"])
     read = map(_measure, term.inputs) if term.inputs else ["SA(T)"]
     method = method_named(document["method"])

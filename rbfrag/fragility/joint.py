@@ -128,9 +128,10 @@ class Placement:
             raise InputError(f"blocks of a portfolio must have columns of one length, not {shapes}")
         if not (np.isfinite(self.l).all() and np.isfinite(self.ln_y).all()):
             raise InputError("ln p and ln y of every block of a portfolio must be finite")
-        if not np.isin(self.polarity, (-1, UNKNOWN, 1)).all():
+        if (np.abs(self.polarity) > 1).any():
             raise InputError("a polarity is +1, -1, or 0 where the azimuth is unknown")
-        if self.drawn.any() and not np.isin(self.component[~self.drawn], range(COMPONENTS)).all():
+        drawn, component = self.drawn, self.component
+        if drawn.any() and ((component < 0) | (component >= COMPONENTS))[~drawn].any():
             raise InputError("with blocks of unknown azimuth the components must be 0 and 1")
 
     @property

@@ -20,6 +20,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from functools import lru_cache
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -37,10 +38,12 @@ from rbfrag.fragility.joint import (
     joint_excess,
     pair_correlations,
 )
+from rbfrag.solver.integrator.compiled import kernel
 from rbfrag.solver.results import FloatArray
 
 JITTER = 1e-8
-"""Added to the diagonal, so that a matrix of nearly equal blocks can be factored."""
+"""Correlations of different points are divided by one more than this, so that the matrix of nearly
+equal blocks can be factored."""
 
 MOST_OF_A_COMPONENT = 400
 """Unlike blocks of one component up to which its own matrix is factored."""
@@ -61,25 +64,24 @@ class JointSampler:
     def __init__(self, law: Dependence, blocks: Placement) -> None:
         self._law, self._blocks = law, blocks
         # what is drawn for a block: its own component, or both where the azimuth is not known
-        n, drawn = np.arange(blocks.size), blocks.drawn
-        self._second = np.flatnonzero(drawn)
+        n, unknown = np.arange(blocks.size), blocks.drawn
+        self._second = np.flatnonzero(unknown)
         block = np.concatenate([n, self._second])
         component = np.concatenate(
-            [np.where(drawn, 0, blocks.component), np.ones_like(self._second)]
+            [np.where(unknown, 0, blocks.component), np.ones_like(self._second)]
         )
-        self._event = _Line(blocks.l, (blocks.earthquake,), law.l_e)
-        self._site = _Line(blocks.l, (blocks.earthquake, blocks.site), law.l_e)
+        event, site = (blocks.earthquake,), (blocks.earthquake, blocks.site)
         of_block = (blocks.earthquake[block], blocks.site[block], component)
+        self._event, self._site = (_Line(blocks.l, group, law.l_e) for group in (event, site))
+        points = _GroupedNodes.of(blocks.l[block], blocks.ln_y[block], of_block)
         self._symmetric, self._antisymmetric = (
-            _Surface(blocks.l[block], blocks.ln_y[block], of_block, (length, law.l_y))
-            for length in (law.l_v, law.l_o)
+            _Surface(points, (length, law.l_y)) for length in (law.l_v, law.l_o)
         )
-        nowhere, groups = np.zeros(block.size), (blocks.earthquake, blocks.site)
-        self._completed = (
-            _Line(nowhere[n], groups[:1], 1.0),
-            _Line(nowhere[n], groups, 1.0),
-            _Line(nowhere, of_block, 1.0),
-        )
+        self._completed: list[_Line] = []
+        if (blocks.loadings.variance > 1.0).any():
+            nowhere = np.zeros(block.size)
+            self._completed = [_Line(nowhere[: group[0].size], group, 1.0)
+                               for group in (event, site, of_block)]  # fmt: skip
 
     def sides(self, draws: int, generator: np.random.Generator) -> FloatArray:
         """Return Z on each side that blocks may face, shape (sides, draws, n).
@@ -92,19 +94,21 @@ class JointSampler:
         symmetric = np.sqrt(law.rho_v) * self._symmetric.draw(draws, generator)
         antisymmetric = np.sqrt(law.rho_o) * self._antisymmetric.draw(draws, generator)
         loadings = self._blocks.loadings
-        if (loadings.variance > 1.0).any():
+        if self._completed:
             event, site, component = (line.draw(draws, generator) for line in self._completed)
-            common += loadings.event * event + loadings.site * site
-            symmetric += np.append(loadings.component, loadings.component[second]) * component
-        z = np.empty((SIDES if second.size else 1, draws, n))
-        for k in range(z.shape[0]):
-            columns = np.arange(n)
-            if k >= SIDES // COMPONENTS:
-                columns[second] = np.arange(n, n + second.size)
-            facing = np.where(self._blocks.drawn, 1 - 2 * (k % 2), self._blocks.polarity)
-            z[k] = common + symmetric[:, columns] + facing * antisymmetric[:, columns]
-        z /= np.sqrt(loadings.variance)
-        return z
+            common += loadings.event[:, None] * event + loadings.site[:, None] * site
+            of_component = np.append(loadings.component, loadings.component[second])
+            symmetric += of_component[:, None] * component
+            scale = 1.0 / np.sqrt(loadings.variance)[:, None]
+            common *= scale
+            both = np.concatenate([scale, scale[second]])
+            symmetric *= both
+            antisymmetric *= both
+        sides = np.arange(SIDES if second.size else 1)[:, None]
+        row = np.tile(np.arange(n), (sides.size, 1))
+        row[SIDES // COMPONENTS :, second] = np.arange(n, n + second.size)
+        facing = np.where(self._blocks.drawn, 1 - 2 * (sides % 2), self._blocks.polarity)
+        return sum_of_parts(common, symmetric, antisymmetric, row, facing)
 
     def normals(self, draws: int, generator: np.random.Generator) -> FloatArray:
         """Return Z, shape (draws, n)."""
@@ -124,6 +128,32 @@ class JointSampler:
         return np.asarray(self.normals(draws, generator) <= ndtri(p))
 
 
+@kernel
+def sum_of_parts(
+    common: FloatArray,
+    symmetric: FloatArray,
+    antisymmetric: FloatArray,
+    row: Indices,
+    facing: IntArray,
+) -> FloatArray:
+    """Return Z = common + symmetric ± antisymmetric on each side, sides x draws x n.
+
+    Args:
+        common: what the earthquake and the site share, n x draws.
+        symmetric: even part of the components, rows x draws, as is `antisymmetric`.
+        row: row of each side and block, sides x n.
+        facing: sign of the antisymmetric part, sides x n.
+    """
+    n, draws = common.shape
+    z = np.empty((row.shape[0], draws, n))
+    for side in range(row.shape[0]):
+        for i in range(n):
+            at, sign = row[side, i], facing[side, i]
+            for k in range(draws):
+                z[side, k, i] = common[i, k] + symmetric[at, k] + sign * antisymmetric[at, k]
+    return z
+
+
 def _unlike(*columns: NDArray[np.generic]) -> tuple[Indices, Indices]:
     """Return the indices of distinct rows, sorted by the columns, and the inverse index of each
     row.
@@ -138,29 +168,56 @@ def _unlike(*columns: NDArray[np.generic]) -> tuple[Indices, Indices]:
     return order[new], node
 
 
+class _GroupedNodes(NamedTuple):
+    """Distinct points of groups of blocks, sorted by group, x and y.
+
+    Args:
+        x: first variable, shape (k,).
+        y: second variable, shape (k,).
+        node: point of each block, shape (n,).
+        start: first point of each group, and k.
+    """
+
+    x: FloatArray
+    y: FloatArray
+    node: Indices
+    start: Indices
+
+    @classmethod
+    def of(
+        cls, x: FloatArray, y: FloatArray, group: tuple[NDArray[np.int64], ...]
+    ) -> _GroupedNodes:
+        """Return the points of blocks, whose groups are given by labels."""
+        first, node = _unlike(*group, x, y)
+        is_new = np.zeros(first.size, dtype=np.bool_)
+        is_new[:1] = True
+        for labels in group:
+            is_new[1:] |= labels[first][1:] != labels[first][:-1]
+        return cls(x[first], y[first], node, np.append(np.flatnonzero(is_new), first.size))
+
+
 class _Line:
     """Ornstein-Uhlenbeck processes in one variable, one for each group."""
 
     def __init__(self, x: FloatArray, group: tuple[NDArray[np.int64], ...], length: float) -> None:
-        first, self._node = _unlike(*group, x)
-        starts = np.zeros(first.size, dtype=np.bool_)
-        starts[:1] = True
-        for labels in group:
-            starts[1:] |= labels[first][1:] != labels[first][:-1]
-        # the first rows of all groups, then the second rows, and so on
-        row = np.arange(starts.size)
-        rank = row - np.maximum.accumulate(np.where(starts, row, 0))
-        order = np.argsort(rank, kind="stable")
-        self._ranks = np.split(order, np.flatnonzero(np.diff(rank[order])) + 1)
-        self._correlation, self._new = _transitions(np.diff(x[first], prepend=0.0), length)
+        points = _GroupedNodes.of(x, np.zeros(x.size), group)
+        self._node = points.node
+        self._correlation, self._new = _transitions(np.diff(points.x, prepend=0.0), length)
+        self._correlation[points.start[:-1]], self._new[points.start[:-1]] = 0.0, 1.0
 
     def draw(self, draws: int, generator: np.random.Generator) -> FloatArray:
-        """Return the values at x, shape (draws, n)."""
+        """Return the values at x, shape (n, draws)."""
         value = generator.standard_normal((self._correlation.size, draws))
-        for at in self._ranks[1:]:
-            value[at] *= self._new[at, None]
-            value[at] += self._correlation[at, None] * value[at - 1]
-        return np.asarray(value.T[:, self._node])
+        run_line(value, self._correlation, self._new)
+        return np.asarray(value[self._node])
+
+
+@kernel
+def run_line(value: FloatArray, correlation: FloatArray, new: FloatArray) -> None:
+    """Transform independent normals, nodes x draws, into Ornstein-Uhlenbeck processes."""
+    for i in range(1, value.shape[0]):
+        for k in range(value.shape[1]):
+            value[i, k] = new[i] * value[i, k] + correlation[i] * value[i - 1, k]
 
 
 def _transitions(step: FloatArray, length: float) -> tuple[FloatArray, FloatArray]:
@@ -180,45 +237,20 @@ class _Surface:
     points up to one step farther or nearer.
     """
 
-    def __init__(
-        self,
-        x: FloatArray,
-        y: FloatArray,
-        group: tuple[NDArray[np.int64], ...],
-        lengths: tuple[float, float],
-    ) -> None:
-        first, self._node = _unlike(*group, x, y)
-        self._size = first.size
-        of_node = np.zeros(first.size, dtype=np.bool_)
-        of_node[:1] = True
-        for labels in group:
-            of_node[1:] |= labels[first][1:] != labels[first][:-1]
-        start = np.flatnonzero(of_node)
-        number = np.diff(np.append(start, first.size))
-        x, y = x[first], y[first]
-        self._factors: list[tuple[Indices, FloatArray]] = []
-        for size in np.unique(number[number <= MOST_OF_A_COMPONENT]):
-            groups = start[number == size][:, None] + np.arange(size)
-            at_once = max(1, _VALUES_AT_ONCE // size**2)  # matrices stay within memory
-            for portion in range(0, groups.shape[0], at_once):
-                rows = groups[portion : portion + at_once]
-                apart = [np.abs(v[rows][:, :, None] - v[rows][:, None, :]) for v in (x, y)]
-                r = np.exp(-apart[0] / lengths[0] - apart[1] / lengths[1])
-                r[..., np.arange(size), np.arange(size)] += JITTER
-                self._factors.append((rows, np.linalg.cholesky(r / (1.0 + JITTER))))
-        self._grids: list[tuple[Indices, _Axis, _Axis]] = []
-        for begin, size in zip(start, number, strict=True):
-            if size > MOST_OF_A_COMPONENT:
-                rows = np.arange(begin, begin + size)
-                axes = _Axis(x[rows], lengths[0]), _Axis(y[rows], lengths[1])
+    def __init__(self, points: _GroupedNodes, lengths: tuple[float, float]) -> None:
+        self._points = points
+        self._factors = factor_groups(*points[:2], points.start, *lengths, MOST_OF_A_COMPONENT)
+        self._grids: list[tuple[slice, _Axis, _Axis]] = []
+        for begin, end in pairwise(points.start.tolist()):
+            if end - begin > MOST_OF_A_COMPONENT:
+                rows = slice(begin, end)
+                axes = _Axis(points.x[rows], lengths[0]), _Axis(points.y[rows], lengths[1])
                 self._grids.append((rows, *axes))
 
     def draw(self, draws: int, generator: np.random.Generator) -> FloatArray:
-        """Return the values at (x, y), shape (draws, n)."""
-        value = np.empty((draws, self._size))
-        for rows, factor in self._factors:
-            noise = generator.standard_normal((*rows.shape, draws))
-            value[:, rows] = np.moveaxis(factor @ noise, -1, 0)
+        """Return the values at (x, y), shape (n, draws)."""
+        value = generator.standard_normal((self._points.x.size, draws))
+        correlate_groups(value, self._points.start, self._factors, MOST_OF_A_COMPONENT)
         for rows, first, other in self._grids:
             shape = first.correlation.size, other.correlation.size
             at_once = max(1, _VALUES_AT_ONCE // (shape[0] * shape[1]))
@@ -226,8 +258,56 @@ class _Surface:
                 field = generator.standard_normal((*shape, min(at_once, draws - start)))
                 first.run(field)
                 other.run(field.swapaxes(0, 1))
-                value[start : start + at_once, rows] = field[first.node, other.node].T
-        return value[:, self._node]
+                value[rows, start : start + at_once] = field[first.node, other.node]
+        return np.asarray(value[self._points.node])
+
+
+@kernel
+def factor_groups(
+    x: FloatArray, y: FloatArray, start: Indices, length_x: float, length_y: float, most: int
+) -> FloatArray:
+    """Return the Cholesky factors U of R = UᵀU = exp(-|Δx|/length_x - |Δy|/length_y), one group
+    after the other, flat; of groups with more than `most` points none.
+    """
+    size = np.diff(start)
+    factors = np.empty(np.sum(np.where(size > most, 0, size * size)))
+    end = 0
+    for group in range(size.size):
+        n, at = size[group], start[group]
+        if n > most:
+            continue
+        r = factors[end : end + n * n].reshape((n, n))
+        end += n * n
+        for i in range(n):
+            for j in range(i, n):
+                away = abs(x[at + i] - x[at + j]) / length_x + abs(y[at + i] - y[at + j]) / length_y
+                r[i, j] = np.exp(-away) / (1.0 + JITTER)
+            r[i, i] = 1.0
+        # row by row, in place: the inner loop runs along a row in memory
+        for i in range(n):
+            r[i, i:] /= np.sqrt(r[i, i])
+            for j in range(i + 1, n):
+                r[j, j:] -= r[i, j] * r[i, j:]
+    return factors
+
+
+@kernel
+def correlate_groups(value: FloatArray, start: Indices, factors: FloatArray, most: int) -> None:
+    """Transform independent normals, points x draws, into fields of the groups: z = Uᵀ value."""
+    # in place, the last point first: those before it are still independent normals then
+    end = 0
+    for group in range(start.size - 1):
+        at, n = start[group], start[group + 1] - start[group]
+        if n > most:
+            continue
+        r = factors[end : end + n * n].reshape((n, n))
+        end += n * n
+        for i in range(n - 1, -1, -1):
+            for k in range(value.shape[1]):
+                value[at + i, k] *= r[i, i]
+            for j in range(i):
+                for k in range(value.shape[1]):
+                    value[at + i, k] += r[j, i] * value[at + j, k]
 
 
 class _Axis:

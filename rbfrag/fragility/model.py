@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple, cast
 
@@ -115,6 +115,10 @@ class FragilityModel:
         default_factory=dict, compare=False, repr=False
     )
     """What :meth:`for_inputs` has returned for some measures."""
+    used_inputs: dict[tuple[str, ...], tuple[str, ...]] = field(
+        default_factory=dict, compare=False, repr=False
+    )
+    """The measures that are used of some names."""
     ranges: dict[tuple[str, ...], list[tuple[str, float, float]]] = field(
         default_factory=dict, compare=False, repr=False
     )
@@ -212,7 +216,10 @@ class FragilityModel:
         velocity = self.form.velocity
         if velocity is None:
             return self
-        used = used_inputs(TERMS[self.row.term], velocity, names)
+        key = tuple(names)
+        used = self.used_inputs.get(key)
+        if used is None:
+            used = self.used_inputs[key] = used_inputs(TERMS[self.row.term], velocity, names)
         if self.completion is not None and self.completion.used == used:
             return self
         model = self.completed_models.get(used)
@@ -435,14 +442,19 @@ class FragilityModel:
         self.ranges[key] = ranges
         return ranges
 
-    def lies_outside(self, values: dict[str, Any], ns: ArrayNamespace) -> Any:
-        """Return whether completed values lie outside the fitted ranges."""
+    def excursions(self, values: dict[str, Any]) -> Iterator[tuple[str, float, Any]]:
+        """Yield the edges of the fitted ranges, with whether completed values lie beyond each."""
         values = self.with_ratios(values)
-        outside: Any = False
         for name, (low, high) in self.row.domain.items():
             if name in values:
-                value = values[name]
-                outside = outside | (value < low * (1.0 - 1e-9)) | (value > high * (1.0 + 1e-9))
+                yield name, low, values[name] < low * (1.0 - 1e-9)
+                yield name, high, values[name] > high * (1.0 + 1e-9)
+
+    def lies_outside(self, values: dict[str, Any], ns: ArrayNamespace) -> Any:
+        """Return whether completed values lie outside the fitted ranges."""
+        outside: Any = False
+        for _, _, holds in self.excursions(values):
+            outside = outside | holds
         if self.spread is not None:
             outside = outside | (self.spread.holds(values, ns) ^ True)
         return outside

@@ -217,9 +217,11 @@ def unused_measures(model: FragilityModel, names: Collection[str]) -> tuple[Diag
     unused = [
         name
         for name in names
-        if name in MEASURES and name not in read
+        if name not in read and name in MEASURES
         if name not in ABOUT_SCATTER or SCATTERED.get(name, read[0]) not in read
     ]
+    if not unused:
+        return ()
     uses = " and ".join(dict.fromkeys(map(input_of, read)))
     alone = [
         name for name in unused

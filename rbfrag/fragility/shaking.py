@@ -14,7 +14,9 @@ interpolated ordinates, with the moments of :mod:`rbfrag.fragility.velocity_mome
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from abc import abstractmethod
+from collections import Counter
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, fields, replace
 from typing import Any, Self
 
@@ -23,7 +25,7 @@ from rbfrag.fragility.completion import UNCERTAIN_VELOCITY
 from rbfrag.fragility.confidence import Quantiles
 from rbfrag.fragility.correlation import correlation
 from rbfrag.fragility.measures import ABOUT_SCATTER, AMPLIFIED, SCATTERED, SIGMAS, Term
-from rbfrag.fragility.method import ArrayNamespace, LinearPredictor, MechanicalBound
+from rbfrag.fragility.method import SINGLE, ArrayNamespace, LinearPredictor, MechanicalBound
 from rbfrag.fragility.model import Answer, FragilityModel
 from rbfrag.vocabulary.spectral import period_of
 
@@ -146,6 +148,16 @@ class MeanModel(FragilityModel):
         del names
         return ()
 
+    @abstractmethod
+    def main_excursion(self, inputs: Mapping[str, float]) -> tuple[str, float] | None:
+        """Return the variable and the edge of its fitted range that most of P lies beyond.
+
+        None where each variable is within its range, and only their combination is not.
+
+        Args:
+            inputs: the question, single numbers.
+        """
+
 
 @dataclass(frozen=True)
 class ShakenModel(MeanModel):
@@ -166,18 +178,9 @@ class ShakenModel(MeanModel):
         inputs: Mapping[str, Any],
     ) -> Answer:
         """Return the prediction averaged over the shaking; see :class:`FragilityModel`."""
-        scatter, link = self.scatter, self.method.link
-        sigmas = {
-            name: math.hypot(scatter.deviation(name, inputs), scatter.shared(name, inputs))
-            for name in scatter.names
-        }
-        middle = outside = 0.0
+        link, middle, outside = self.method.link, 0.0, 0.0
         totals: list[float] = []
-        for x, weight in zip(POINTS, WEIGHTS, strict=True):
-            at = {**inputs, **{n: inputs[n] * math.exp(sigma * x) for n, sigma in sigmas.items()}}
-            values = self.completed(at, ns)
-            if any(bound.holds(values) for bound in FragilityModel.bounds(self, values)):
-                continue
+        for weight, values in self._points(inputs, ns):
             unscaled, h = self.linear_predictor(values, ns)
             p = weight * link.probability(unscaled.eta * h, ns)
             middle += p
@@ -200,3 +203,27 @@ class ShakenModel(MeanModel):
         reach = self.errors.half_width(mean, quantiles, ns)
         low, high = (link.probability(at_mean + end * reach, ns) for end in (-1.0, 1.0))
         return answer._replace(low=low, high=high)
+
+    def _points(
+        self, inputs: Mapping[str, Any], ns: ArrayNamespace
+    ) -> Iterator[tuple[float, dict[str, Any]]]:
+        """Yield weight and completed values of the points at which the block can fail."""
+        scatter = self.scatter
+        sigmas = {
+            name: math.hypot(scatter.deviation(name, inputs), scatter.shared(name, inputs))
+            for name in scatter.names
+        }
+        for x, weight in zip(POINTS, WEIGHTS, strict=True):
+            at = {**inputs, **{n: inputs[n] * math.exp(sigma * x) for n, sigma in sigmas.items()}}
+            values = self.completed(at, ns)
+            if not any(bound.holds(values) for bound in FragilityModel.bounds(self, values)):
+                yield weight, values
+
+    def main_excursion(self, inputs: Mapping[str, float]) -> tuple[str, float] | None:
+        """Return the variable and edge beyond which most of P lies; see :class:`MeanModel`."""
+        beyond: Counter[tuple[str, float]] = Counter()
+        for weight, values in self._points(inputs, SINGLE):
+            unscaled, h = self.linear_predictor(values, SINGLE)
+            p = weight * self.method.link.probability(unscaled.eta * h, SINGLE)
+            beyond.update({(n, edge): p for n, edge, holds in self.excursions(values) if holds})
+        return max(beyond, key=beyond.__getitem__, default=None)

@@ -27,7 +27,10 @@ SHORTEST_S, LONGEST_S = 0.1, 10.0
 """Range of the periods over which means are taken; longer ordinates are not read."""
 
 _STEP = math.log(100.0) / 59.0
-_TOPPLING_LN_S = tuple(math.log(SHORTEST_S) + j * _STEP for j in range(60))
+_TOPPLING_PERIODS = tuple(
+    (ln_t, math.exp(2.0 * ln_t)) for ln_t in (math.log(SHORTEST_S) + j * _STEP for j in range(60))
+)
+"""ln T and T² of the periods of the mean over a toppling block."""
 _CORNER = 1.4 * 2.0 * math.pi
 _ROCKING_LN = tuple(math.log(0.25 * 2.0 * math.pi) + j * math.log(8.0) / 23.0 for j in range(24))
 _ENDS_LN_S = math.log(SHORTEST_S), math.log(LONGEST_S)
@@ -57,21 +60,22 @@ def ln_toppling_velocity(ordinates: Ordinates, p: Any, ns: ArrayNamespace) -> An
     scaled = p * (1.0 / _CORNER)
     square = scaled * scaled
     total: Any = 0.0
-    last, cube, ratio = -1, ns.exp(3.0 * at[0][1]), 1.0
-    for ln_t in _TOPPLING_LN_S:
+    last, cube, ratio, following = -1, ns.exp(3.0 * at[0][1]), 1.0, at[0][0]
+    for ln_t, square_s2 in _TOPPLING_PERIODS:
         cube = cube * ratio
-        if last + 1 < len(at) and ln_t >= at[last + 1][0]:
+        if ln_t >= following:
             while last + 1 < len(at) and ln_t >= at[last + 1][0]:
                 last += 1
             start, value = at[last]
-            slope = 0.0
+            slope, following = 0.0, math.inf
             if last + 1 < len(at):
+                following = at[last + 1][0]
                 slope = (at[last + 1][1] - value) * (3.0 / (at[last + 1][0] - start))
             cube, ratio = ns.exp(3.0 * value + slope * (ln_t - start)), ns.exp(slope * _STEP)
-        damped = 1.0 + square * math.exp(2.0 * ln_t)
+        damped = 1.0 + square * square_s2
         total = total + cube / (damped * ns.sqrt(damped))
     total = ns.maximum(total, 1e-300)  # without shaking
-    return ns.log(total * (1.0 / len(_TOPPLING_LN_S))) * (1.0 / 3.0)
+    return ns.log(total * (1.0 / len(_TOPPLING_PERIODS))) * (1.0 / 3.0)
 
 
 def ln_rocking_velocity(ordinates: Ordinates, p: Any, ns: ArrayNamespace) -> Any:

@@ -369,6 +369,27 @@ class UncertainModel(MeanModel):
         share = weight / weight.sum(axis=over, keepdims=True)
         return (probability * share).sum(axis=over), float(self.points.lower(columns)[0, 0, 0])
 
+    def main_excursion(self, inputs: Mapping[str, float]) -> tuple[str, float] | None:
+        """Return the variable and edge beyond which most of P lies; see :class:`MeanModel`.
+
+        Of a block under certain shaking, most of what it may be.
+        """
+        columns = {n: np.atleast_1d(np.asarray(v, dtype=np.float64)) for n, v in inputs.items()}
+        points, weight = self.points, self.possible.weight
+        factors = np.empty(0) if points is None else points.factors(columns)
+        if points is not None:
+            weight = np.multiply.outer(weight, points.weight)
+        shape = (*weight.shape, 1)
+        with np.errstate(all="ignore"):
+            values = self._values(columns, factors)
+            p = np.ones(shape) if points is None else self._certain(values, shape)[0]
+            beyond = {
+                (name, edge): float((weight[..., None] * p * holds).sum())
+                for name, edge, holds in self.excursions(values)
+                if np.any(holds)
+            }
+        return max(beyond, key=beyond.__getitem__, default=None)
+
     def _part(
         self,
         inputs: Mapping[str, FloatArray],

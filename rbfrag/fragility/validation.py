@@ -14,7 +14,7 @@ import math
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING, Any, NamedTuple, NoReturn
+from typing import TYPE_CHECKING, Any, NamedTuple, NoReturn, cast
 
 from rbfrag.errors import InputError
 from rbfrag.fragility.completion import MOMENTS
@@ -31,7 +31,7 @@ from rbfrag.fragility.measures import (
 from rbfrag.fragility.method import ArrayNamespace, BlockParameters, arrays
 from rbfrag.fragility.model import LEAST, Answer, FragilityModel
 from rbfrag.results.diagnostic import Diagnostic
-from rbfrag.results.numbers import exact_percent
+from rbfrag.results.numbers import exact_percent, percent
 from rbfrag.solver.kinds import BY_MECHANICS
 from rbfrag.vocabulary.quantities import INPUTS, INTENSITY, NUMBERS, QUANTITIES
 from rbfrag.vocabulary.spectral import spectral_names
@@ -39,6 +39,8 @@ from rbfrag.vocabulary.spectral import spectral_names
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
+
+    from rbfrag.fragility.shaking import MeanModel
 
 
 _UNITS = {"velocity_m_s": "m/s"}
@@ -109,10 +111,24 @@ _RATIO_NAMES = frozenset(ratio.name for ratio in RATIOS)
 NOTABLE_SHARE = 0.05
 """From this share of an uncertain block, or of P, outside the fitted ranges on it is told."""
 
-PARTLY_OUTSIDE = (
-    f"at least {exact_percent(NOTABLE_SHARE)} of P, or of the block uncertainty, comes from "
-    "outside the fitted range: the answer is in part an extrapolation"
-)
+
+def _partly_outside(model: FragilityModel, inputs: Mapping[str, Any], share: float | None) -> str:
+    """Return the warning about a fraction outside the fitted ranges; None of many answers."""
+    of = "P comes from" if model.scattered else "the block uncertainty lies"
+    part, mostly = f"at least {exact_percent(NOTABLE_SHARE)}", ""
+    if share is not None and model.uncertain:
+        part = percent(share)
+        if (main := cast("MeanModel", model).main_excursion(inputs)) is not None:
+            name, edge = main
+            side = "below" if edge == model.row.domain[name][0] else "above"
+            is_pgv = name == "intensity_m_s" and model.term.inputs[0] == "pgv_m_s"
+            name = "pgv_m_s" if is_pgv else name
+            word = (name in QUANTITIES and QUANTITIES[name].symbol) or _word(name)
+            mostly = f" (mostly {word} {side} {edge:.3g} {_unit(name)})".replace(" )", ")")
+    return (
+        f"{part} of {of} outside the fitted range{mostly}: the answer is in part an extrapolation"
+    )
+
 
 NO_SHAKING = "no shaking"
 
@@ -210,7 +226,10 @@ def answer_with_findings(
         name: ns.maximum(value, LEAST) for name, value in values.items() if name != MOMENTS
     }
     model.with_ratios(values, above_zero)
-    no_shaking = (inputs[term.inputs[0]] == 0.0) & _not(missing) & _not(at_rest)
+    no_shaking: Any = inputs[term.inputs[0]] == 0.0
+    for name in {"pgv_m_s", "pga_g"} & {*term.inputs}:  # no motion has one peak without the other
+        no_shaking = no_shaking | (inputs[name] == 0.0)
+    no_shaking = no_shaking & _not(missing) & _not(at_rest)
     say(no_shaking, Remark(no_shaking, "", 0.0, NO_SHAKING, BY_MECHANICS, "no_shaking"))
     unanswered = missing | at_rest | no_shaking
     ruled = unanswered
@@ -227,7 +246,8 @@ def answer_with_findings(
         answer = model.answer(values, quantiles, ns, floored)
     if answer.outside is not None:
         partly = (answer.outside >= NOTABLE_SHARE) & _not(ruled)
-        say(partly, Remark(partly, "", answer.outside, PARTLY_OUTSIDE, code="extrapolation"))
+        warning = partial(_partly_outside, model, floored)
+        say(partly, Remark(partly, "", answer.outside, warning, code="extrapolation"))
     in_domain = _not(missing)
     if model.scattered and answer.outside is not None:
         in_domain = in_domain & _not(partly)

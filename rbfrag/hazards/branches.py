@@ -48,6 +48,19 @@ def curve_warnings(curve: HazardCurve, answer: str) -> Iterator[str]:
         )
 
 
+def first_curve_warnings(
+    curves: Sequence[HazardCurve], weight: FloatArray | None
+) -> Iterator[Diagnostic]:
+    """Yield a warning where one realization of several curves stands for all of them."""
+    if weight is None and len(curves) > 1 and curves[0].statistic != "mean":
+        yield Diagnostic(
+            f"the answer is that of the first of {len(curves)} hazard curves, "
+            f"{curve_name(curves[0])}: give the weights of the branches for their mean",
+            "first_curve",
+            fields=("weights",),
+        )
+
+
 def branch_curves(
     curve_sources: CurveLike | Sequence[CurveLike], weights: Weights | None, meaning: CurveKeywords
 ) -> tuple[list[HazardCurve], FloatArray | None]:

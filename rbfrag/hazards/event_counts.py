@@ -6,6 +6,7 @@ that as many fail as face sides whose Z is low enough; how many face each side i
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
@@ -18,36 +19,40 @@ from scipy.special import ndtr, ndtri
 from rbfrag.fragility.joint import SIDES, Indices, IntArray
 from rbfrag.fragility.joint_sampling import JointSampler, LargeCounts, LatentEvent
 from rbfrag.fragility.uncertain import normal_steps
-from rbfrag.hazards.event_means import shifts_on
-from rbfrag.hazards.event_set import EventSet
+from rbfrag.hazards.event_set import TOLERANCE, EventSet
 from rbfrag.hazards.joint_rate import COPULA, DEPENDENT, INDEPENDENT
 from rbfrag.hazards.portfolio import Portfolio
 from rbfrag.hazards.rate_density import Grid, smoothing_of
+from rbfrag.hazards.score_tables import MEAN, MEDIAN, REACH, ScoreTables, score_tables
 from rbfrag.hazards.shaking import HazardLevel
+from rbfrag.solver.integrator.compiled import kernel
 from rbfrag.solver.results import FloatArray
 
-PAIRS_AT_ONCE, SAMPLES_AT_ONCE = 1 << 19, 1 << 22
-"""Blocks times rows of shaking, and samples of all events, of one part of the work: some 200 MB."""
+PAIRS_AT_ONCE, SAMPLES_AT_ONCE = 1 << 17, 1 << 20
+"""Blocks times rows of shaking, and samples of all events, of one part of the work: half a second
+and some 50 MB."""
 
-_MOST_KEPT = 1 << 24
-"""Shifts on the nodes of all sites up to which they are kept for the next parts: 130 MB."""
+MOST_KEPT = 1 << 26
+"""Values on the nodes of all sites up to which they are kept for all parts: 540 MB."""
 
 NOTHING = 1e-12
 """Smaller probabilities are zero."""
+
+_LEAST_SCORE = float(ndtri(NOTHING))
 
 LARGE, ENOUGH_SITES = 1000, 30
 """Numbers of distinct blocks and of sites above which only the count of failures is sampled."""
 
 _VALUES_AT_ONCE = 1 << 19
-_OF_EVENTS, _OF_BLOCKS = 0, 1
+_OF_EVENTS, _OF_BLOCKS = 0, 1  # streams of random numbers under one seed
 _MAX_SAMPLERS = 16
-_STRENGTHS, _SIZES, _REACH = 41, 9, 5.0
+_STRENGTHS, _SIZES = 41, 9
 """Points of what like blocks scatter by, and how far they reach in standard deviations."""
 
 _FARTHEST, _LEAST_SHAKING = 38.0, 1e-4
-_MOST_ON_NODES, _SHIFT_STEP = 1000, 0.02
-"""Blocks of a site up to which what shifts do to them is kept on nodes, and the step of these
-where nothing scatters: a shift changes slowly with the shaking."""
+_MOST_ON_NODES, _STEP, _NODES_A_SHIFT = 1000, 0.02, 4
+"""Blocks of a site up to which their scores are tabulated on nodes, and the step of these where
+nothing scatters: a score changes slowly with the shaking."""
 
 _MOST_SUMMED = 50
 """Costs of like blocks that are drawn one by one; the sum of more by its three moments."""
@@ -65,8 +70,7 @@ class EventYears(NamedTuple):
         range_u: range of ln(level) over all events; None for that of these events.
         shifted: the portfolio by models of other parameters, which answer by the same samples; as
             many as two of each principal axis of the models' errors are taken for these.
-        cached_shifts: shifts on the nodes of each site that a part has used, for the next ones;
-            None without a cache.
+        tables: scores of all blocks on nodes; None where they are made site by site, or not at all.
     """
 
     number: int
@@ -78,7 +82,7 @@ class EventYears(NamedTuple):
     seed: int
     shifted: tuple[Portfolio, ...] = ()
     range_u: tuple[float, float] | None = None
-    cached_shifts: dict[int, FloatArray] | None = None
+    tables: ScoreTables | None = None
 
 
 EventBatch = tuple[int, EventSet]
@@ -153,6 +157,11 @@ class TriggeredBlocks(NamedTuple):
     square: FloatArray
     shift: FloatArray
 
+    def only(self, chosen: Indices) -> TriggeredBlocks:
+        """Return a selection of the blocks."""
+        columns = {name: values[..., chosen] for name, values in self._asdict().items()}
+        return TriggeredBlocks(**columns)
+
 
 def laws_of(portfolio: Portfolio) -> tuple[str, ...]:
     """Return the dependence models: that of the stored model, or the two bounds."""
@@ -209,12 +218,14 @@ def count_part(part: EventYears) -> PartCounts:
         blocks[2, indices] += events.weight[event] * shaken.outside
         if cost is not None:
             loss[event] = p @ (cost[indices] * number[indices])
-        if part.samples:
-            key = indices.tobytes()
+        sampled = _noticeable(portfolio, shaken)
+        if part.samples and sampled.size:
+            shaken = shaken.only(sampled)
+            key = shaken.block.tobytes()
             if key not in samplers:
                 if len(samplers) == _MAX_SAMPLERS:
                     samplers.clear()
-                samplers[key] = _sampler(portfolio, indices)
+                samplers[key] = _sampler(portfolio, shaken.block)
             drawn[:, event], with_any[:, event] = _sampled(part, event, shaken, samplers[key])
     # Variance of the loss within an event, over its samples.
     variance = np.full((laws, n), np.nan)
@@ -235,9 +246,47 @@ def count_part(part: EventYears) -> PartCounts:
     )  # fmt: skip
 
 
-def log_shaking(events: EventSet, portfolio: Portfolio) -> FloatArray:
-    """Return ln(level) of the first measure of the models for each row of an event set."""
-    return np.asarray(np.log(np.maximum(events.measures[portfolio.measures[0]], _LEAST_SHAKING)))
+def log_shaking(
+    events: EventSet, portfolio: Portfolio, row: Indices | slice = slice(None)
+) -> FloatArray:
+    """Return ln(level) of the first measure of the models for rows of an event set."""
+    levels = events.measures[portfolio.measures[0]][row]
+    return np.asarray(np.log(np.maximum(levels, _LEAST_SHAKING)))
+
+
+def tables_of(
+    part: EventYears, indices: Indices | None = None, *, keep: int | None = None
+) -> ScoreTables | None:
+    """Return the scores of blocks on nodes; None where each pair is evaluated by the models: with
+    several intensity measures, with shifts other than those along the axes of the errors, where
+    so many blocks share a site that few of the pairs may fail, or beyond `keep`.
+
+    Args:
+        part: events, or their range of u alone.
+        indices: rows of one site; None for all.
+        keep: values up to which the tables are made.
+    """
+    portfolio = part.portfolio
+    along_axes = len(part.shifted) == 2 * sum(len(row.coefficients) for row in portfolio.models)
+    most = int(np.bincount(portfolio.site).max(initial=0))
+    if (
+        len(portfolio.measures) != 1
+        or most > _MOST_ON_NODES
+        or not (along_axes or not part.shifted)
+    ):
+        return None
+    about = HazardLevel.about(portfolio.measures[0], portfolio.component)
+    step, smoothing = _STEP, smoothing_of(about)[1]
+    if smoothing.reach:  # scores are smooth: fewer nodes than a rate needs
+        step = math.log(about.shift[1] / about.shift[0]) / _NODES_A_SHIFT
+        smoothing = smoothing._replace(every=_NODES_A_SHIFT)
+    u = log_shaking(part.events, portfolio)
+    low, high = part.range_u or (float(u.min()), float(u.max()))
+    grid = Grid.over(step, low, high, smoothing.reach)
+    rows = np.arange(portfolio.size) if indices is None else indices
+    if keep is not None and (len(part.shifted) + 4) * rows.size * grid.size > keep:
+        return None
+    return score_tables(portfolio, rows, about, grid, smoothing, shifts=along_axes)
 
 
 def _shaken(part: EventYears) -> Iterator[tuple[int, TriggeredBlocks]]:
@@ -245,69 +294,23 @@ def _shaken(part: EventYears) -> Iterator[tuple[int, TriggeredBlocks]]:
     # P of each pair of event and block, averaged over the component's scatter; pairs below NOTHING
     # are dropped.
     events, portfolio = part.events, part.portfolio
-    z, weight = portfolio.scatter_points()
     parts: list[tuple[NDArray[np.generic], ...]] = []
-    most = int(np.bincount(portfolio.site).max(initial=0))
-    along_axes = len(part.shifted) == 2 * sum(len(row.coefficients) for row in portfolio.models)
-    one_measure = along_axes and len(portfolio.measures) == 1 and most <= _MOST_ON_NODES
-    shifts = None
-    if one_measure:  # on nodes, a fraction of the work
-        about = HazardLevel.about(portfolio.measures[0], portfolio.component)
-        step, smoothing = smoothing_of(about)
-        step = step if smoothing.reach else _SHIFT_STEP
-        u = log_shaking(events, portfolio)
-        low, high = part.range_u or (float(u.min()), float(u.max()))
-        grid = Grid.over(step, low, high, smoothing.reach)
-        few = len(part.shifted) * portfolio.size * grid.size <= _MOST_KEPT
-    cached = {} if part.cached_shifts is None else part.cached_shifts
+    order = np.argsort(events.site, kind="stable")
+    starts = np.searchsorted(events.site[order], np.arange(len(events.site_ids) + 1))
     for site in np.intersect1d(events.site, portfolio.site).tolist():
         indices = np.flatnonzero(portfolio.site == site)
-        if one_measure:
-            shifts = cached.get(site)
-            if shifts is None:
-                shifts = shifts_on(portfolio, indices, about, grid, smoothing)
-            if few:
-                cached[site] = shifts
-        rows = np.flatnonzero(events.site == site)
-        at_once = max(1, _VALUES_AT_ONCE // (indices.size * weight.size))
-        for start in range(0, rows.size, at_once):
-            chunk = rows[start : start + at_once]
-            shaking = {n: events.measures[n][chunk, None, None] for n in portfolio.measures}
-            points = (z[:, 0, None], z[:, 1, None], z[:, 2, None])
-            at_points, inside = portfolio.probability(indices, shaking, points)
-            p, outside = (
-                np.einsum("rkm,k->rm", values, weight)
-                for values in (at_points, at_points * ~inside)
-            )
-            which, block = np.nonzero(p > NOTHING)
-            shifted = (
-                np.einsum("rkm,k->rm", other.probability(indices, shaking, points)[0], weight)
-                for other in (() if shifts is not None else part.shifted)
-            )
-            square = 0.0 * p
-            if part.shifted and weight.size > 1:  # the variance of Φ⁻¹(P) over its points
-                score = np.clip(ndtri(at_points), -_REACH, _REACH)
-                mean, of_square = (
-                    np.einsum("rkm,k->rm", values, weight) for values in (score, score * score)
-                )
-                square = np.maximum(of_square - mean * mean, 0.0)
-            columns = [values[which, block] for values in (p, outside, square, *shifted)]
-            if shifts is not None:
-                first, weights = grid.cubic(u[chunk][which])
-                columns += [*sum(w * shifts[:, block, first + i] for i, w in enumerate(weights))]
-            parts.append((indices[block], chunk[which], *columns))
+        rows = order[starts[site] : starts[site + 1]]
+        tables = part.tables or tables_of(part, indices)
+        if tables is None:
+            parts += _pairs(part, indices, rows)
+        else:
+            parts += _pairs_on_nodes(part, indices, rows, tables)
     if not parts:
         return
     block, row, *columns = (np.concatenate(column) for column in zip(*parts, strict=True))
     order = np.lexsort((block, events.event[row]))
-    block, row, p, outside, square, *more = (values[order] for values in (block, row, *columns))
-    # Parameter errors enter as shifts of the score Φ⁻¹(P), which keep the order of blocks in a
-    # sample: all shifted portfolios use the same draws.
-    p = np.minimum(p, 1.0)
-    shift = np.stack([np.zeros(p.size), *more])
-    if not one_measure:
-        with np.errstate(invalid="ignore"):
-            shift[1:] = np.nan_to_num(ndtri(np.minimum(shift[1:], 1.0)) - ndtri(p), nan=0.0)
+    block, row, p, outside, square, *shift = (values[order] for values in (block, row, *columns))
+    shifts = np.stack([np.zeros(p.size), *shift])
     event = events.event[row]
     starts = np.flatnonzero(np.diff(event, prepend=-1))
     for first, last in pairwise([*starts.tolist(), event.size]):
@@ -315,9 +318,85 @@ def _shaken(part: EventYears) -> Iterator[tuple[int, TriggeredBlocks]]:
         yield (
             int(event[first]),
             TriggeredBlocks(
-                block[span], row[span], p[span], outside[span], square[span], shift[:, span]
+                block[span], row[span], p[span], outside[span], square[span], shifts[:, span]
             ),
         )
+
+
+def _pairs_on_nodes(
+    part: EventYears, indices: Indices, rows: Indices, tables: ScoreTables
+) -> Iterator[tuple[FloatArray | Indices, ...]]:
+    """Yield blocks of a site and rows of their shaking, with P and what :class:`TriggeredBlocks`
+    has of them, from the scores on nodes.
+    """
+    u, in_tables = log_shaking(part.events, part.portfolio, rows), indices - tables.first
+    at_once = max(1, _VALUES_AT_ONCE // indices.size)
+    for start in range(0, rows.size, at_once):
+        chunk = slice(start, start + at_once)
+        block, level = np.tile(in_tables, u[chunk].size), np.repeat(u[chunk], indices.size)
+        score = tables.score_at(MEAN, block, level)
+        pairs = np.flatnonzero(score > _LEAST_SCORE)
+        columns = tables.means_at(block[pairs], level[pairs])
+        row, place = np.divmod(pairs, indices.size)
+        yield indices[place], rows[chunk][row], ndtr(score[pairs]), *columns
+
+
+def _pairs(
+    part: EventYears, indices: Indices, rows: Indices
+) -> Iterator[tuple[FloatArray | Indices, ...]]:
+    """Yield the same with the models evaluated at each pair."""
+    events, portfolio = part.events, part.portfolio
+    z, weight = portfolio.scatter_points()
+    at_once = max(1, _VALUES_AT_ONCE // (indices.size * weight.size))
+    for start in range(0, rows.size, at_once):
+        chunk = rows[start : start + at_once]
+        shaking = {n: events.measures[n][chunk, None, None] for n in portfolio.measures}
+        points = (z[:, 0, None], z[:, 1, None], z[:, 2, None])
+        at_points, inside = portfolio.probability(indices, shaking, points)
+        p, outside = (
+            np.einsum("rkm,k->rm", values, weight) for values in (at_points, at_points * ~inside)
+        )
+        which, block = np.nonzero(p > NOTHING)
+        shifted = (
+            np.einsum("rkm,k->rm", other.probability(indices, shaking, points)[0], weight)
+            for other in part.shifted
+        )
+        square = 0.0 * p
+        if part.shifted and weight.size > 1:  # the variance of Φ⁻¹(P) over its points
+            score = np.clip(ndtri(at_points), -REACH, REACH)
+            mean, of_square = (
+                np.einsum("rkm,k->rm", values, weight) for values in (score, score * score)
+            )
+            square = np.maximum(of_square - mean * mean, 0.0)
+        p, outside, square, *moved = (
+            values[which, block] for values in (p, outside, square, *shifted)
+        )
+        p = np.minimum(p, 1.0)
+        # Parameter errors enter as shifts of the score Φ⁻¹(P), which keep the order of blocks in a
+        # sample: all shifted portfolios use the same draws.
+        with np.errstate(invalid="ignore"):
+            shifts = (
+                np.nan_to_num(ndtri(np.minimum(other, 1.0)) - ndtri(p), nan=0.0) for other in moved
+            )
+        yield indices[block], chunk[which], p, outside, square, *shifts
+
+
+def _noticeable(portfolio: Portfolio, shaken: TriggeredBlocks) -> Indices:
+    """Return the blocks of an event that are sampled.
+
+    The m blocks fail at least once with a probability of at least max P, and add Σ w P to the
+    failures and the losses. A block without samples adds less than `TOLERANCE`/m of each.
+    """
+    block, noticeable = shaken.block, np.zeros(shaken.block.size, dtype=np.bool_)
+    p, count = shaken.probability, portfolio.count[shaken.block]
+    least = TOLERANCE / max(block.size, 1)
+    counted = portfolio.weight[block] > 0.0
+    noticeable |= counted & (count * p >= least * p[counted].max(initial=0.0))
+    for mark in (portfolio.weight, portfolio.mean_loss):
+        if mark is not None:
+            expected = p * count * mark[block]
+            noticeable |= (expected > 0.0) & (expected >= least * expected.max(initial=0.0))
+    return np.flatnonzero(noticeable)
 
 
 def _sampler(portfolio: Portfolio, indices: Indices) -> JointSampler | LargeCounts | None:
@@ -325,7 +404,7 @@ def _sampler(portfolio: Portfolio, indices: Indices) -> JointSampler | LargeCoun
     law = portfolio.dependence
     if law is None:
         return None
-    where, sites = portfolio.placement(indices), np.unique(portfolio.site[indices]).size
+    where, sites = portfolio.placement.only(indices), np.unique(portfolio.site[indices]).size
     certain = not portfolio.is_uncertain and (portfolio.weight[indices] > 0.0).all()
     if indices.size > LARGE and sites >= ENOUGH_SITES and certain:
         return LargeCounts(law, where, portfolio.count[indices])
@@ -446,10 +525,11 @@ def _failing(
         parts.append((at[1], members[at[2]], np.broadcast_to(many, z.shape)[at], excess[at]))
     columns = [np.concatenate(column) for column in zip(*parts, strict=True)]
     order = np.argsort(columns[3] > 0.0, kind="stable")  # costs do not depend on the shifts
-    sample, block, many, excess = (array[order] for array in columns)
-    row, at_once = np.nonzero(excess <= shift[:, block])
-    failing, cost = weight[block] * many, _costs(portfolio, indices[block], many, seed)
-    of_rows = [(row, *(array[at_once] for array in (sample, failing, cost)))]
+    columns = [column[order] for column in columns]
+    sample, block, many, excess = columns
+    sums = np.zeros((len(shift), 2, draws))
+    cost = _costs(portfolio, indices[block], many, seed)
+    add_failing(sums, sample, block, excess, shift, weight[block] * many, cost)
     # Identical blocks of a row are not followed one by one: given Z of a side, their number of
     # failures is binomial.
     scattered = like[chance]
@@ -462,10 +542,36 @@ def _failing(
         sample, block = np.nonzero(by_chance)
         many, block = by_chance[sample, block], scattered[block]
         cost = _costs(portfolio, indices[block], many, seed)
-        of_rows.append((np.full(sample.size, i), sample, weight[block] * many, cost))
-    row, sample, *values = (np.concatenate(column) for column in zip(*of_rows, strict=True))
-    sums = [np.bincount(row * draws + sample, array, len(shift) * draws) for array in values]
-    return np.array(sums, dtype=np.float64).reshape(2, -1, draws).swapaxes(0, 1)
+        for total, values in zip(sums[i], (weight[block] * many, cost), strict=True):
+            total += np.bincount(sample, values, draws)
+    return sums
+
+
+@kernel
+def add_failing(
+    sums: FloatArray,
+    sample: Indices,
+    block: Indices,
+    excess: FloatArray,
+    shift: FloatArray,
+    number: FloatArray,
+    cost: FloatArray,
+) -> None:
+    """Add what fails in each sample by each shifted portfolio.
+
+    Args:
+        sums: failures and losses that are added to, shifts x 2 x draws.
+        sample: sample of each candidate, shape (n,), as are the next two.
+        block: its block.
+        excess: by how much its Z lies above the threshold without a shift.
+        shift: changes of the thresholds, shifts x blocks.
+        number: failures that a candidate counts, shape (n,), as is `cost`, its loss.
+    """
+    for i in range(sample.size):
+        for row in range(shift.shape[0]):
+            if excess[i] <= shift[row, block[i]]:
+                sums[row, 0, sample[i]] += number[i]
+                sums[row, 1, sample[i]] += cost[i]
 
 
 def _bounds_of_z(
@@ -480,8 +586,8 @@ def _bounds_of_z(
     # block's own size and strength. Single blocks draw both; identical blocks keep the scores on a
     # grid of strengths, from which their number of failures is drawn.
     portfolio, indices = part.portfolio, shaken.block
-    strengths = np.linspace(-_REACH, _REACH, _STRENGTHS)
-    sizes, weight = normal_steps(_SIZES, _REACH)
+    strengths = np.linspace(-REACH, REACH, _STRENGTHS)
+    sizes, weight = normal_steps(_SIZES, REACH)
     sigma = portfolio.size_sigma[indices] + portfolio.strength_sigma[indices]
     scattered = (portfolio.count[indices] > 1) & (sigma > 0.0)
     none = np.empty((_STRENGTHS, _SIZES, 1, 0))
@@ -490,6 +596,8 @@ def _bounds_of_z(
         return lambda _: _Bounds(bound, scattered, none, strengths, weight)
     sites, site = np.unique(portfolio.site[indices], return_inverse=True)
     shaking = {name: part.events.measures[name][shaken.row] for name in portfolio.measures}
+    tables = None if sigma.any() else part.tables
+    u = log_shaking(part.events, portfolio, shaken.row)
     streams = [
         [np.random.default_rng([part.seed, _OF_BLOCKS, block, i]) for block in indices.tolist()]
         for i in range(2 if sigma.any() else 0)
@@ -499,6 +607,11 @@ def _bounds_of_z(
         xi = generator.standard_normal((k, sites.size))[:, site]
         z = [np.stack([rng.standard_normal(k) for rng in rngs], axis=1) for rngs in streams]
         z_p, z_k = z or (np.zeros(1), np.zeros(1))
+        if tables is not None:
+            rows = np.broadcast_to(indices - tables.first, xi.shape).ravel()
+            levels = (u + portfolio.component.sigma * xi).ravel()
+            bound = tables.score_at(MEDIAN, rows, levels).reshape(xi.shape)
+            return _Bounds(bound, scattered, none, strengths, weight)
         p, scores = portfolio.probability(indices, shaking, (xi, z_p, z_k))[0], none
         if scattered.any():
             subset = {name: values[scattered] for name, values in shaking.items()}
@@ -566,7 +679,7 @@ def _of_many(
     if portfolio.component.sigma > 0.0:
         shaking = {name: part.events.measures[name][shaken.row] for name in portfolio.measures}
         ends = (portfolio.probability(indices, shaking, (xi, 0.0, 0.0))[0] for xi in (1.0, -1.0))
-        high, low = (np.clip(ndtri(end), -_REACH, _REACH) for end in ends)
+        high, low = (np.clip(ndtri(end), -REACH, REACH) for end in ends)
         variance = 0.25 * (high - low) ** 2
         of_each = portfolio.count[indices] * p * (1.0 - p) + NOTHING
         common = float(np.average(variance / (1.0 + variance), weights=of_each))

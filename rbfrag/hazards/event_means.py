@@ -11,20 +11,18 @@ from collections.abc import Iterator
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.special import ndtri
 
-from rbfrag.db.model_file import ModelRow
 from rbfrag.fragility.confidence import ParameterErrors
 from rbfrag.hazards.event_set import EventSet, IntArray
 from rbfrag.hazards.portfolio import Portfolio
-from rbfrag.hazards.rate_density import Grid, Indices, SiteMass, Smoothing, smoothing_of
+from rbfrag.hazards.rate_density import Grid, Indices, SiteMass, smoothing_of
 from rbfrag.hazards.rate_integration import KernelBlocks, half_width, sums_of, table_of
 from rbfrag.hazards.shaking import HazardLevel
 from rbfrag.solver.integrator.compiled import inner_kernel, kernel
 from rbfrag.solver.results import FloatArray
 
 _BLOCKS_AT_ONCE = 256
-_SURE, _LEAST = 1.0 - 1e-16, 1e-30
+_SURE = 1.0 - 1e-16
 _MUCH = 1e3
 
 
@@ -78,8 +76,8 @@ def event_means(events: EventSet, portfolio: Portfolio, level: float) -> EventMe
     totals: dict[str, tuple[ParameterErrors, Any]] = {}
     for first, last in _groups(site, sites.size):
         tables = np.zeros((4, last - first, mass.grid.size))
-        for indices, group in _blocks_of(portfolio, np.flatnonzero((site >= first) & (site < last)),
-                                      site, shaking):  # fmt: skip
+        rows = np.flatnonzero((site >= first) & (site < last))
+        for indices, group in blocks_by_model(portfolio, rows, site, shaking):
             allowed = group.allowed_from(mass.grid)
             table = table_of(group, mass.grid, 0, allowed)
             p = np.clip(mass.smoothing.of(table.probability), 0.0, 1.0)
@@ -187,60 +185,6 @@ def cubic_at(
     return start, -b * c * d / 6.0, a * c * d / 2.0, -a * b * d / 2.0, a * b * c / 6.0
 
 
-def axes_of(row: ModelRow) -> FloatArray:
-    """Return the principal axes of a model's covariance in columns, one standard deviation long."""
-    variances, axes = np.linalg.eigh(np.array(row.covariance))
-    return np.asarray(np.sqrt(np.maximum(variances, 0.0)) * axes)
-
-
-def shifts_on(
-    portfolio: Portfolio, indices: Indices, shaking: HazardLevel, grid: Grid, smoothing: Smoothing
-) -> FloatArray:
-    """Return the changes of Φ⁻¹(P) at b ± one standard deviation along the principal axes.
-
-    Args:
-        indices: rows of the portfolio, m of them.
-
-    Returns:
-        Both sides of each axis of each model, one model after the other, x m x nodes; 0 for blocks
-        of other models.
-    """
-    sizes = [2 * len(row.coefficients) for row in portfolio.models]
-    result = np.zeros((sum(sizes), indices.size, grid.size))
-    for positions, blocks in _blocks_of(
-        portfolio, indices, np.zeros(portfolio.size, np.intp), shaking
-    ):
-        number = int(portfolio.model[positions[0]])
-        first = sum(sizes[:number])
-        nowhere = np.full((blocks.weight.size, blocks.size), -np.inf)
-        axes = axes_of(portfolio.models[number]).T
-        p = smoothing.of(np.stack([
-            table_of(blocks.moved(step), grid, 0, nowhere, slopes=False).probability
-            for step in (0.0 * axes[0], *(side * axis for axis in axes for side in (1.0, -1.0)))
-        ]))  # fmt: skip
-        z = ndtri(np.clip(p, _LEAST, _SURE))
-        shift = (z[1:] - z[0]) * _of_regression(blocks, grid)
-        result[first : first + sizes[number], np.searchsorted(indices, positions)] = shift
-    return result
-
-
-def _of_regression(blocks: KernelBlocks, grid: Grid) -> FloatArray | float:
-    """Return the factor on the standard deviation of Φ⁻¹(P) that stands for the errors of the
-    regression of a spectral velocity, m x nodes: they are taken to move the blocks as b does.
-    """
-    errors, k = blocks.model.errors, len(blocks.model.parameters)
-    if not errors.node_steps:
-        return 1.0
-    nowhere = np.full((blocks.weight.size, blocks.size), -np.inf)
-    slopes = np.stack(table_of(blocks, grid, 0, nowhere).slopes or ())
-    total, part = (
-        np.square(np.tensordot(errors.matrix[:, :stop], slopes[:stop], axes=1)).sum(axis=0)
-        for stop in (errors.size, k)
-    )
-    ratio = np.divide(total, part, out=np.ones_like(total), where=part > 0.0)
-    return np.asarray(np.sqrt(ratio))
-
-
 def _groups(site: Indices, sites: int) -> Iterator[tuple[int, int]]:
     """Yield ranges of sites with a few hundred blocks in total, or of one larger site."""
     number = np.bincount(site, minlength=sites)
@@ -253,7 +197,7 @@ def _groups(site: Indices, sites: int) -> Iterator[tuple[int, int]]:
     yield first, sites
 
 
-def _blocks_of(
+def blocks_by_model(
     portfolio: Portfolio, rows: Indices, site: Indices, shaking: HazardLevel
 ) -> Iterator[tuple[Indices, KernelBlocks]]:
     """Yield rows of the portfolio by model, a few at a time."""

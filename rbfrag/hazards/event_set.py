@@ -249,6 +249,11 @@ def ends_by_name(uncertainty: object) -> dict[str, float | None]:
     }
 
 
+TOLERANCE = 1e-5
+"""Fraction of the probability of any failure, of the expected failures and of the expected loss of
+an event that blocks without samples add at most."""
+
+
 def reached_interval(events: EventSet, rate: float, squares: float, level: float) -> Ends:
     """Return both ends of the interval, by event-set sampling, of how often something is reached.
 
@@ -256,11 +261,16 @@ def reached_interval(events: EventSet, rate: float, squares: float, level: float
         rate: rate of events that reach it [1/yr]; of a scenario its probability.
         squares: sum of the squared parts of it.
         level: confidence level.
+
+    Blocks that are not sampled can only raise the rate: the numerical error, `TOLERANCE` of it, is
+    added to the upper end.
     """
     if events.is_scenario:
         alike = float((events.weight**2).sum())
-        return share_interval(rate, squares - rate * rate * alike, alike, level)
-    return rate_interval(rate, squares, float(events.weight.max()), level)
+        low, high = share_interval(rate, squares - rate * rate * alike, alike, level)
+        return low, min(high * (1.0 + TOLERANCE), 1.0)
+    low, high = rate_interval(rate, squares, float(events.weight.max()), level)
+    return low, high * (1.0 + TOLERANCE)
 
 
 def branch_ends(events: EventSet, sums: FloatArray) -> Ends | None:

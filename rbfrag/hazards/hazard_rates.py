@@ -25,6 +25,7 @@ from rbfrag.hazards.branches import (
     branch_curves,
     curve_name,
     curve_warnings,
+    first_curve_warnings,
     mixture_quantiles,
     reject_several_measures,
     weighted_quantiles,
@@ -46,7 +47,6 @@ from rbfrag.hazards.rate_density import Indices, curve_mass
 from rbfrag.hazards.rate_integration import (
     KernelBlocks,
     Rates,
-    Run,
     curve_contributions,
     half_width,
     interval_end,
@@ -89,7 +89,6 @@ def hazard(
     years: float = 50.0,
     one_class: bool = False,
     count: ArrayLike | None = None,
-    run: Run | None = None,
     **question: Unpack[RateKeywords[ArrayLike | None]],
 ) -> HazardAnswer:
     """Return the annual rates of failure of blocks under a seismic hazard curve.
@@ -140,7 +139,6 @@ def hazard(
         one_class: the blocks stand for one class, and the answer is the rate of a block drawn
             from it: one rate, by the mean of their fragilities.
         count: number of identical blocks of each, shape (m,); None for one each.
-        run: does the parts of the work, as worker processes may; None for here.
         question: the keywords above.
 
     Raises:
@@ -158,7 +156,7 @@ def hazard(
     def answer(blocks: Mapping[str, Any]) -> HazardAnswer:
         return hazard_at_sites(
             [curves], None, blocks, meaning, answering, weight=weight, joint=joint,
-            at_least=at_least, years=years, one_class=one_class, count=count, run=run,
+            at_least=at_least, years=years, one_class=one_class, count=count,
         )  # fmt: skip
 
     result = answer(inputs)
@@ -197,7 +195,6 @@ def hazard_at_sites(
     years: float = 50.0,
     one_class: bool = False,
     count: ArrayLike | None = None,
-    run: Run | None = None,
 ) -> HazardAnswer:
     """Return the annual rates of failure of blocks at several sites; see :func:`hazard`.
 
@@ -232,6 +229,8 @@ def hazard_at_sites(
     where = np.zeros(sound.size, dtype=np.intp) if site is None else site
     branch_weight = np.zeros(len(sites[0]))
     branch_weight[0] = 1.0
+    if len(sites[0]) == 1:
+        weight = None  # one realization has no spread
     if weight is not None:
         branch_weight = np.nan_to_num(weight)
     # Rate density of the intensity measure on a grid in ln im, per site and branch: -dν, smoothed
@@ -245,7 +244,7 @@ def hazard_at_sites(
         indices = where[part.indices]
         for rows, group in KernelBlocks.of(part.model, reading.median, part.numbers, indices):
             blocks.append((part.indices[rows], group))
-    group_rates = [(indices, group, rates(group, mass, level, run)) for indices, group in blocks]
+    group_rates = [(indices, group, rates(group, mass, level)) for indices, group in blocks]
     number = np.ones(sound.size) if count is None else np.asarray(count, dtype=np.float64)
     result = _join_rates(group_rates, sound.size, len(mass.branches))
     total = _total_half(group_rates, number, level)
@@ -291,6 +290,7 @@ def hazard_at_sites(
             FROM_MEAN if one_class else FROM_SUMS,
         ),
         *notes, *pga_alone,
+        *first_curve_warnings(sites[0], weight),
         *(note for curves in sites for curve in curves for note in curve_warnings(curve, "a rate")),
         *(note for part in parts for note in part.model.notes),
         *describe_ends(first, where, result.rate, above, above_at_most, below),

@@ -14,6 +14,7 @@ from rbfrag.fragility import describe
 from rbfrag.hazards.event_set import (
     QUANTILES,
     SOURCES,
+    TOLERANCE,
     Ends,
     EventSet,
     MeanUncertainty,
@@ -355,6 +356,7 @@ class LossAnswer(Result):
             "realizations": len(events.realization_weights),
             "effective_years": events.effective_years,
             "samples": self.samples or None,
+            "tolerance": TOLERANCE if self.samples else None,
             "seed": self.seed if self.samples else None,
             "level": self.level,
             "how": by_model(names),

@@ -13,6 +13,7 @@ from rbfrag.fragility import describe
 from rbfrag.fragility.confidence import quantiles_of
 from rbfrag.hazards.curve import NOTABLE
 from rbfrag.hazards.event_counts import (
+    MOST_KEPT,
     PAIRS_AT_ONCE,
     SAMPLES_AT_ONCE,
     Curves,
@@ -23,8 +24,9 @@ from rbfrag.hazards.event_counts import (
     laws_of,
     log_shaking,
     shift_error,
+    tables_of,
 )
-from rbfrag.hazards.event_means import EventMeans, axes_of, event_means
+from rbfrag.hazards.event_means import EventMeans, event_means
 from rbfrag.hazards.event_set import (
     QUANTILES,
     EventSet,
@@ -36,6 +38,7 @@ from rbfrag.hazards.joint_rate import BOUNDS_GIVEN, SEVERAL_MODELS, UNKNOWN_TO_M
 from rbfrag.hazards.loss_answer import Exceedance, LossAnswer
 from rbfrag.hazards.portfolio import Portfolio
 from rbfrag.hazards.rate_integration import interval_end
+from rbfrag.hazards.score_tables import axes_of
 from rbfrag.results.diagnostic import Diagnostic
 from rbfrag.results.numbers import percent
 from rbfrag.solver.results import FloatArray
@@ -46,6 +49,12 @@ Run = Callable[[Iterator[EventBatch], int, EventYears], Iterator[PartCounts]]
 
 Given are the parts, their number, and what all have in common.
 """
+
+FEWEST_PARTS = 8
+"""Parts below which the work is one part: that takes less time than the start of workers."""
+
+LARGER_PARTS = 64
+"""By how much parts are larger where each makes tables of its own: some 600 MB."""
 
 EACH_COUNT_TO = 20
 """Numbers of failures up to which each is given; beyond them steps of equal ratio."""
@@ -81,7 +90,7 @@ def event_losses(
         InputError: a number of samples or a seed that is none.
     """
     if isinstance(samples, bool) or not 0 <= samples <= 100_000:
-        raise InputError(f"samples = {samples}: give a number from 1 to 100000")
+        raise InputError(f"samples = {samples}: give 1 to 100000, or 0 for expected values alone")
     if isinstance(seed, bool) or seed < 0:
         raise InputError(f"seed = {seed}: give a whole number, 0 or more")
     if not 0.0 < level < 1.0:
@@ -89,12 +98,25 @@ def event_losses(
     means = event_means(events, portfolio, level) if len(portfolio.measures) == 1 else None
     ends = _ends(portfolio) if samples else (np.empty(0), np.empty(0))
     shifted = shifted_portfolios(portfolio) if samples else ()
-    groups = _groups(events, portfolio, samples) if samples or means is None else []
-    none = _only(events, np.empty(0, dtype=np.intp))
+    by_event = np.argsort(events.event, kind="stable")
+    starts = np.searchsorted(events.event[by_event], np.arange(events.event_id.size + 1))
+    none = _only(events, np.empty(0, dtype=np.intp), by_event[:0])
     u = log_shaking(events, portfolio)
     range_u = (float(u.min(initial=np.inf)), float(u.max(initial=-np.inf)))
-    common = EventYears(-1, portfolio, none, *ends, samples, seed, shifted, range_u, {})
-    parts = ((number, _only(events, group)) for number, group in enumerate(groups))
+    common = EventYears(-1, portfolio, none, *ends, samples, seed, shifted, range_u)
+    pairs_at_once = PAIRS_AT_ONCE
+    if samples and u.size:
+        common = common._replace(tables=tables_of(common, keep=MOST_KEPT))
+        if common.tables is None:  # each part makes its own tables: fewer and larger parts
+            pairs_at_once *= LARGER_PARTS
+    groups: list[NDArray[np.intp]] = []
+    if samples or means is None:
+        groups = _groups(events, portfolio, samples, pairs_at_once)
+    rows = ([by_event[starts[event] : starts[event + 1]] for event in group] for group in groups)
+    parts = (
+        (number, _only(events, group, np.sort(np.concatenate(of_group))))
+        for number, (group, of_group) in enumerate(zip(groups, rows, strict=True))
+    )
     do: Run = run or (lambda work, _, shared: (count_years(shared, batch) for batch in work))
     events_done = 0
     results: dict[int, PartCounts] = {}
@@ -166,7 +188,9 @@ def event_losses(
     )  # fmt: skip
 
 
-def _groups(events: EventSet, portfolio: Portfolio, samples: int) -> list[NDArray[np.intp]]:
+def _groups(
+    events: EventSet, portfolio: Portfolio, samples: int, pairs_at_once: int
+) -> list[NDArray[np.intp]]:
     """Return the events that shake a site with blocks, grouped by complete years."""
     at_site = np.bincount(portfolio.site, minlength=len(events.site_ids))
     pairs = np.bincount(events.event, at_site[events.site], minlength=events.event_id.size)
@@ -178,16 +202,17 @@ def _groups(events: EventSet, portfolio: Portfolio, samples: int) -> list[NDArra
     new = (np.diff(year) != 0) | (np.diff(realization) != 0) | events.is_scenario
     starts = np.concatenate([[0], np.flatnonzero(new) + 1])
     # what an event costs, in parts of the work
-    cost = pairs[order] / PAIRS_AT_ONCE + samples / SAMPLES_AT_ONCE
+    cost = pairs[order] / pairs_at_once + samples / SAMPLES_AT_ONCE
+    if cost.sum() < FEWEST_PARTS:
+        return [order]
     number = np.floor((np.cumsum(cost) - cost)[starts])
     return np.split(order, starts[1:][np.diff(number) > 0])
 
 
-def _only(events: EventSet, group: NDArray[np.intp]) -> EventSet:
-    """Return a subset of the events with their rows."""
+def _only(events: EventSet, group: NDArray[np.intp], rows: NDArray[np.intp]) -> EventSet:
+    """Return a subset of the events, with their rows."""
     place = np.full(events.event_id.size, -1)
     place[group] = np.arange(group.size)
-    rows = np.flatnonzero(place[events.event] >= 0)
     return replace(
         events,
         event_id=events.event_id[group],

@@ -182,11 +182,12 @@ class Portfolio:
         """True if parameters of the blocks are uncertain."""
         return bool(self.size_sigma.any() or self.strength_sigma.any())
 
-    def placement(self, indices: NDArray[np.intp]) -> Placement:
-        """Return the placement of selected blocks in one earthquake, with unknown azimuths."""
-        numbers = {name: values[indices] for name, values in self.numbers.items()}
-        model, site = self.answering[0], self.site[indices]
-        placement = Placement.of_blocks(model, numbers, site=site, polarity=UNKNOWN)
+    @cached_property
+    def placement(self) -> Placement:
+        """Placement of the blocks in one earthquake, with unknown azimuths."""
+        placement = Placement.of_blocks(
+            self.answering[0], self.numbers, site=self.site, polarity=UNKNOWN
+        )
         assert placement is not None
         return placement
 

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -23,6 +23,7 @@ from scipy.sparse import csr_array
 
 from rbfrag.hazards.curve import HazardCurve
 from rbfrag.hazards.shaking import HazardLevel
+from rbfrag.solver.integrator.compiled import kernel
 from rbfrag.solver.results import FloatArray
 
 Indices = NDArray[np.intp]
@@ -103,14 +104,21 @@ class Smoothing(NamedTuple):
         """
         if self.weight.size == 1:
             return values
-        size, result = values.shape[-1], np.zeros(values.shape)
-        for weight, shift in zip(
-            self.weight, range(-self.reach, self.reach + 1, self.every), strict=True
-        ):
-            to = slice(max(shift, 0), size + min(shift, 0))
-            of = slice(max(-shift, 0), size - max(shift, 0))
-            result[..., to] += weight * values[..., of]
+        result = np.zeros(values.shape)
+        rows = np.ascontiguousarray(values).reshape(-1, values.shape[-1])
+        smooth_rows(rows, result.reshape(rows.shape), self.weight, self.every)
         return result
+
+
+@kernel
+def smooth_rows(values: FloatArray, result: FloatArray, weight: FloatArray, every: int) -> None:
+    """Add the weighted values of nodes `every` apart to each node of the result, rows x nodes."""
+    size, reach = values.shape[1], every * (weight.size // 2)
+    for row in range(values.shape[0]):
+        for k in range(weight.size):
+            shift = k * every - reach
+            for i in range(max(shift, 0), size + min(shift, 0)):
+                result[row, i] += weight[k] * values[row, i - shift]
 
 
 @dataclass(frozen=True, eq=False)
@@ -257,11 +265,3 @@ _SITES_AT_ONCE = 512
 
 TINY = float(np.finfo(np.float64).tiny)
 ROUNDING = 1e-12
-
-
-def of_sites(mass: SiteMass, sites: slice) -> SiteMass:
-    """Return the rate density of a range of sites."""
-    ends = mass.ends
-    if ends is not None:
-        ends = replace(ends, group=ends.group[sites], rate=ends.rate[sites])
-    return replace(mass, mass=mass.mass[sites], branches=mass.branches[:, sites], ends=ends)

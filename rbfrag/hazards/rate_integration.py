@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rbfrag.db.model_file import ModelRow
 from rbfrag.fragility.completion import MOMENTS
 from rbfrag.fragility.confidence import ParameterErrors, quantiles_of
 from rbfrag.fragility.method import LinearPredictor, arrays
@@ -17,7 +16,7 @@ from rbfrag.fragility.model import FragilityModel
 from rbfrag.fragility.uncertain import normal_product, scatter_steps
 from rbfrag.fragility.validation import outside_domain
 from rbfrag.hazards.curve import HazardCurve
-from rbfrag.hazards.rate_density import Grid, Indices, SiteMass, curve_mass, of_sites, under
+from rbfrag.hazards.rate_density import Grid, Indices, SiteMass, curve_mass, under
 from rbfrag.hazards.shaking import HazardLevel
 from rbfrag.solver.results import FloatArray
 from rbfrag.solver.scatter import fraction, lognormal
@@ -28,7 +27,6 @@ _VALUES_AT_ONCE = 1 << 17
 _EDGE_EVERY = 10
 """Nodes between two edges of what the parts of a rate are given for."""
 
-_BLOCKS_OF_A_PART = 4096
 _FARTHEST = 50.0
 """Logarithm of the factor beyond which an end of an interval is meaningless."""
 
@@ -176,13 +174,13 @@ def table_of(
     """
     u = grid.u[first:]
     with np.errstate(all="ignore"):
-        p, by_parameter, values = _evaluated(blocks, u, slopes=slopes)
+        p, by_parameter, values = evaluated(blocks, u, slopes=slopes)
         draws = blocks.weight.size
         # of many draws each jumps elsewhere, which comes to the same
         jumps = draws == 1 and bool((allowed[0] > u[0]).any())
         if jumps:
             # P just above the jump: to P itself, one more node
-            at, at_slopes, _ = _evaluated(blocks, allowed[..., None] + 1e-9, slopes=slopes)
+            at, at_slopes, _ = evaluated(blocks, allowed[..., None] + 1e-9, slopes=slopes)
             _smooth_jumps(grid, first, allowed[0], p[0], at[0, :, 0])
             for slope, slope_at_jump in zip(by_parameter, at_slopes, strict=True):
                 _smooth_jumps(grid, first, allowed[0], slope[0], slope_at_jump[0, :, 0])
@@ -196,9 +194,10 @@ def table_of(
     )
 
 
-def _evaluated(
+def evaluated(
     blocks: KernelBlocks, u: FloatArray, *, slopes: bool
 ) -> tuple[FloatArray, list[FloatArray], dict[str, Any]]:
+    """Return P of the blocks at u, draws x m x nodes, its slopes if asked for, and the inputs."""
     model, ns, values = blocks.model, arrays(), blocks.values(u)
     unscaled, h = model.linear_predictor(values, ns)
     eta, link = unscaled.eta * h, model.method.link
@@ -268,49 +267,12 @@ class Rates(NamedTuple):
     ends: FloatArray
 
 
-class RatePart(NamedTuple):
-    """Blocks of some sites, as sent to a worker.
-
-    Args:
-        number: place of the part in the order of all.
-        row: the model as stored.
-        measures: what it reads of the shaking.
-        blocks: the other attributes of `KernelBlocks`, by name.
-        mass: of these sites alone.
-        level: confidence level of the interval.
-    """
-
-    number: int
-    row: ModelRow
-    measures: tuple[str, ...]
-    blocks: Mapping[str, Any]
-    mass: SiteMass
-    level: float
-
-
-Run = Callable[[Iterator[RatePart], int], Iterator[tuple[int, Rates]]]
-"""Does the parts of the work, of which the number is given, and yields their numbers and rates in
-any order."""
-
-
-def rate_part(part: RatePart) -> tuple[int, Rates]:
-    """Return number and rates of one part; a module-level function, for worker processes."""
-    model = FragilityModel.from_row(part.row).for_inputs(part.measures)
-    blocks = KernelBlocks(model, **part.blocks)
-    return part.number, rates(blocks, part.mass, part.level)
-
-
-def rates(blocks: KernelBlocks, mass: SiteMass, level: float, run: Run | None = None) -> Rates:
+def rates(blocks: KernelBlocks, mass: SiteMass, level: float) -> Rates:
     """Return the annual rates of failure of blocks.
 
-    The parts of the work do not depend on who does them, nor does the answer.
-
     Args:
         level: confidence level of the interval.
-        run: does the parts of the work; None for here, all at once.
     """
-    if run is not None:
-        return _in_parts(blocks, mass, level, run)
     allowed = blocks.allowed_from(mass.grid)
     k, b = blocks.model.errors.size, mass.branches.shape[0]
     rows = np.zeros((6 + k + b, blocks.size))
@@ -324,30 +286,6 @@ def rates(blocks: KernelBlocks, mass: SiteMass, level: float, run: Run | None = 
         rows[0], half_width(blocks.model.errors, gradient, level), gradient, rows[1], rows[2],
         rows[3 + k : 3 + k + b], rows[3 + k + b :],
     )  # fmt: skip
-
-
-def _in_parts(blocks: KernelBlocks, mass: SiteMass, level: float, run: Run) -> Rates:
-    order = np.argsort(blocks.site, kind="stable")
-    parts = np.split(order, np.arange(_BLOCKS_OF_A_PART, order.size, _BLOCKS_OF_A_PART))
-
-    def work_parts() -> Iterator[RatePart]:
-        for number, indices in enumerate(parts):
-            group = blocks.only(indices)
-            low, high = int(group.site.min()), int(group.site.max()) + 1
-            columns = {
-                "median": group.median, "numbers": group.numbers, "weight": group.weight,
-                "site": group.site - low,
-            }  # fmt: skip
-            site_mass = of_sites(mass, slice(low, high))
-            model = group.model
-            yield RatePart(number, model.row, model.term.inputs, columns, site_mass, level)
-
-    results = sorted(run(work_parts(), len(parts)))
-    joined = (
-        np.concatenate(values, axis=-1) for values in zip(*(r for _, r in results), strict=True)
-    )
-    back = np.argsort(order)
-    return Rates(*(values[..., back] for values in joined))
 
 
 def half_width(errors: ParameterErrors, gradient: FloatArray, level: float) -> FloatArray:

@@ -12,7 +12,13 @@ from numpy.typing import ArrayLike
 
 from rbfrag.errors import InputError
 from rbfrag.fragility import describe
-from rbfrag.hazards.branches import Weights, branch_curves, curve_name, curve_warnings
+from rbfrag.hazards.branches import (
+    Weights,
+    branch_curves,
+    curve_name,
+    curve_warnings,
+    first_curve_warnings,
+)
 from rbfrag.hazards.curve import NOTABLE, NOTABLE_FACTOR, CurveKeywords, HazardCurve, is_truncated
 from rbfrag.hazards.curve_file import CurveLike
 from rbfrag.hazards.joint_rate import DEPENDENT, INDEPENDENT
@@ -424,7 +430,11 @@ def survival(
         imt=site_curves[0].imt,
         site=site_curves[0].place,
         level=answering.get("level", LEVEL),
-        warnings=tuple(dict.fromkeys(_warnings(site_curves, rates, blocks))),
+        warnings=tuple(
+            dict.fromkeys(
+                (*first_curve_warnings(site_curves, weight), *_warnings(site_curves, rates, blocks))
+            )
+        ),
         standing=middle,
         annual_rate_beyond=beyond,
         curve_end=end,

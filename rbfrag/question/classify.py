@@ -134,9 +134,12 @@ class Blocks(NamedTuple):
     at_rest: str = ""
 
 
+_SHAPE_FIELDS = frozenset(OF_A_SHAPE)
+
+
 def has_shape(names: Collection[str]) -> bool:
     """Return whether field names describe a block by its geometry."""
-    return any(name in names for name in OF_A_SHAPE)
+    return not _SHAPE_FIELDS.isdisjoint(names)
 
 
 def kinds_by_numbers(names: Collection[str]) -> list[KindSpec]:

@@ -122,6 +122,9 @@ def classify_blocks(
     return blocks._replace(remarks=(*blocks.remarks, *unread), read=blocks.read | unused)
 
 
+TWO_DESCRIPTIONS = "the answer is that of {} in the row; its geometry ({}) is not used"
+
+
 class _ArrayIssues:
     """Records why blocks of an array are rejected; the first reason of each block counts."""
 
@@ -206,7 +209,12 @@ class _BlockClassifier:
             self.kinds[(self.kinds < 0) & has_restitution] = _CODES[facts.kind]
         remaining = np.ones(self.size, dtype=np.bool_)
         for facts in kinds_by_numbers(self.inputs):
-            remaining &= ~self._has_all(facts.parameters)
+            has_numbers = self._has_all(facts.parameters)
+            remaining &= ~has_numbers
+            for shape in shapes:
+                both = np.flatnonzero(has_numbers & self._has_all(shape))
+                text = TWO_DESCRIPTIONS.format(" and ".join(facts.parameters), ", ".join(shape))
+                _ArrayIssues(self, both).remark(True, Diagnostic(text, "two_descriptions"))
         for shape in shapes:
             selected = remaining & self._has_all(shape)
             remaining &= ~selected

@@ -118,6 +118,11 @@ SINGLE_ASSUMED = Diagnostic(
 """Note of an answer whose question does not specify the component."""
 
 
+def depends_on_component(p: Any) -> Any:
+    """Return whether P is neither 0 nor 1, but for rounding, so that the component matters."""
+    return (p > 0.0) & (p < 1.0 - 1e-12)
+
+
 def component_named(name: str) -> Component:
     """Return the component definition with this name.
 

@@ -11,7 +11,11 @@ from rbfrag.fragility.measures import AMPLIFIED, MEASURES
 from rbfrag.fragility.model_selection import find_model, suited_models, unused_measures
 from rbfrag.fragility.prediction import Prediction, add_warnings, answer_given, with_values
 from rbfrag.question.classify import has_shape
-from rbfrag.question.components import SINGLE_ASSUMED, to_single_component
+from rbfrag.question.components import (
+    SINGLE_ASSUMED,
+    depends_on_component,
+    to_single_component,
+)
 from rbfrag.question.drained_bound import with_drained_bound
 from rbfrag.question.nominal import MEASURED, OF_SHAKING, ask_at_rest, described
 from rbfrag.results.diagnostic import Diagnostic, diagnostics
@@ -167,7 +171,7 @@ def answer_numbers(
             assert isinstance(answer, Prediction)
             answers.append(answer)
         unused = () if is_scenario else unused_measures(models[0], question)
-        if is_component_assumed and 0.0 < answers[0].probability < 1.0:
+        if is_component_assumed and depends_on_component(answers[0].probability):
             notes = (_as_rotd50(models[0], question, weights, answers[0].probability),)
     return with_values(
         answers[0],

@@ -21,7 +21,7 @@ from rbfrag.fragility.prediction import (
     with_values,
 )
 from rbfrag.question.classify import Blocks, classify_block, has_shape, read_by_some
-from rbfrag.question.components import SINGLE_ASSUMED, SINGLE_COMPONENT
+from rbfrag.question.components import SINGLE_ASSUMED, SINGLE_COMPONENT, depends_on_component
 from rbfrag.question.shape_validation import size_questions
 from rbfrag.results.diagnostic import Diagnostic, diagnostics
 from rbfrag.solver.kinds import BY_MECHANICS, facts_of
@@ -206,5 +206,5 @@ def _assumed(component: Any, answer: Prediction | PredictionArray) -> tuple[Diag
     if component is not None:
         return ()
     p: Any = answer.probability
-    depends = 0.0 < p < 1.0 if type(p) is float else ((p > 0.0) & (p < 1.0)).any()
+    depends = depends_on_component(p) if type(p) is float else depends_on_component(p).any()
     return (SINGLE_ASSUMED,) if depends else ()

@@ -325,14 +325,23 @@ class Response(Result):
         if self.started_s is None and self.outcome is Outcome.STABLE:
             yield "The block does not move: the motion never exceeds its yield acceleration"
             return
-        verb = KINDS[self.kind].verb if self.kind in KINDS else "fails"
-        if self.outcome is Outcome.STABLE and self.peak_theta_rad is not None:
-            yield f"The block does not {verb.removesuffix('s')}: peak rotation {self._peak()}"
-        elif self.outcome is Outcome.STABLE and self.displacement_m is not None:
+        facts = KINDS.get(self.kind)
+        verb = "fails" if facts is None else facts.verb
+        # without a displacement limit a slide is told by its length
+        slides = facts is None or "displacement_m" in facts.parameters
+        rotates = self.peak_theta_rad is not None
+        if (
+            self.outcome is Outcome.STABLE
+            and self.displacement_m is not None
+            and (slides or not rotates)
+        ):
             way = "along" if self.displacement_m >= 0.0 else "up"
             slid = rounded(abs(self.displacement_m))
-            yield f"The block slides {slid} m {way} its base and stops"
+            tips = f", tips up to {self._peak()}" if rotates else ""
+            yield f"The block slides {slid} m {way} its base{tips} and stops"
             return
+        if self.outcome is Outcome.STABLE and rotates:
+            yield f"The block does not {verb.removesuffix('s')}: peak rotation {self._peak()}"
         else:
             advice = self.outcome.advice
             if self.toppled_s is None:

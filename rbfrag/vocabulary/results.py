@@ -237,6 +237,7 @@ _GROUPS: dict[str, tuple[tuple[str, ...], ...]] = {
         ("ses_per_logic_tree_path", "Number of stochastic event sets per logic-tree path"),
         ("realizations", "Number of logic-tree realizations"),
         ("samples", "Number of samples"),
+        ("tolerance", "Fraction of failures and loss of an event that blocks without samples add"),
         ("measures", "Intensity measures of the event set"),
         ("bounds", "Bounds by dependence of the blocks"),
         ("fully_dependent", "Bound for fully dependent blocks"),

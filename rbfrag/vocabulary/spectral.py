@@ -6,6 +6,8 @@ logarithm. Inputs give several of them at once, by period: ``sa_g`` and ``sa_sig
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 TYPE_CHECKING = False  # that of `typing` would load it
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping
@@ -31,6 +33,7 @@ def spectral_name(period_s: float) -> str:
     return f"sa({period_s:g})"
 
 
+@lru_cache(maxsize=1024)
 def period_of(name: str) -> float | None:
     """Return the period [s] of a spectral acceleration; None for the name of anything else."""
     if not (name.startswith("sa(") and name.endswith(")")):
@@ -43,6 +46,7 @@ def period_of(name: str) -> float | None:
     return period_s if in_range and spectral_name(period_s) == name else None
 
 
+@lru_cache(maxsize=1024)
 def input_of(name: str) -> str:
     """Return the input that gives a quantity: ``sa_g`` for ``sa(0.5)``, else the name itself."""
     if not name.startswith("sa("):
@@ -75,16 +79,17 @@ class SpectralSet(frozenset[str]):
 
     def __contains__(self, name: object) -> bool:
         return super().__contains__(name) or (
-            isinstance(name, str) and super().__contains__(input_of(name))
+            isinstance(name, str) and name[:3] == "sa(" and super().__contains__(input_of(name))
         )
 
     def issuperset(self, names: Iterable[object]) -> bool:
         """Return whether all names belong to the set."""
         return all(name in self for name in names)
 
-    def isdisjoint(self, names: Iterable[object]) -> bool:
+    def isdisjoint(self, names: Iterable[Any]) -> bool:
         """Return whether none of the names belongs to the set."""
-        return not any(name in self for name in names)
+        names = tuple(names)
+        return super().isdisjoint(names) and super().isdisjoint(map(input_of, names))
 
     def intersection(self, *names: Iterable[object]) -> frozenset[str]:
         """Return the names that belong to the set."""

@@ -1,4 +1,4 @@
-"""A Dask cluster in the place of local workers: the same database."""
+"""Local workers, and a Dask cluster in their place: the same database."""
 
 from __future__ import annotations
 
@@ -39,6 +39,25 @@ def cluster() -> Iterator[Any]:
         n_workers=2, threads_per_worker=1, processes=True, dashboard_address=":0"
     ) as result:
         yield result
+
+
+def process_of(_: int) -> int:
+    return os.getpid()
+
+
+@pytest.mark.parametrize(("chunks", "jobs", "limit_s"), [(8, None, 3.0), (8, None, -1.0),
+                                                         (7, None, 3.0), (8, 2, 3.0)])  # fmt: skip
+def test_workers_are_started_for_long_work_only(
+    monkeypatch: pytest.MonkeyPatch, chunks: int, jobs: int | None, limit_s: float
+) -> None:
+    monkeypatch.setattr("os.cpu_count", lambda: 2)
+    monkeypatch.setattr(dask_executor, "TRIAL_S", min(limit_s, 1.0))
+    monkeypatch.setattr(dask_executor, "WORTH_WORKERS_S", limit_s)
+    with dask_executor.executor(process_of, jobs, None) as execute:
+        in_main = [number == os.getpid() for number in execute(iter(range(chunks)), chunks)]
+    # few chunks, or a number of jobs, start workers at once
+    expected = 8 if (chunks, jobs, limit_s) == (8, None, 3.0) else int(limit_s < 0.0)
+    assert (len(in_main), sum(in_main)) == (chunks, expected)
 
 
 def test_the_database_is_that_of_local_workers(

@@ -71,6 +71,9 @@ def test_several_sites_and_nothing_that_tells() -> None:
     assert join_sites(blocks, [""], None).site.tolist() == [0, 0]
     with pytest.raises(InputError, match="2 of 2 blocks have no site"):
         join_sites(blocks, ["a", "b"], [(0.0, 0.0), (1.0, 0.0)])
+    join = join_sites(blocks | {"site_id": ["a", ""]}, ["a", "b"], None)
+    assert join.site.tolist() == [0, -1]
+    assert join.reasons == {1: "site_id is empty, and there are 2 sites: fill it"}
     with pytest.raises(InputError, match="blocks have no site"):
         join_sites(at([0.0], [0.0]), ["a", "b"], None)
     assert options.WITHIN_KM == WITHIN_KM

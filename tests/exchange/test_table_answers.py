@@ -147,6 +147,42 @@ def test_a_measure_for_all_rows(answer: Answer, tmp_path: Path) -> None:
     assert float(rows_of(target)[0]["probability"]) == pytest.approx(expected, rel=1e-12)
 
 
+@pytest.mark.parametrize(
+    ("cell", "words"),
+    [
+        ("", "pgv given for all rows is used for 1 of 2 rows: column 'pgv_m_s' is empty there"),
+        (
+            "0.5",
+            "pgv given for all rows is ignored: column 'pgv_m_s' has a value in every row",
+        ),
+    ],
+)
+def test_cells_before_a_value_for_all_rows_are_named(
+    answer: Answer, tmp_path: Path, cell: str, words: str
+) -> None:
+    (tmp_path / "in.csv").write_text(f"{HEAD}\nA,3,0.1,0.6\nB,3,0.1,{cell}\n", encoding="utf-8")
+    result = answer(tmp_path / "in.csv", tmp_path / "out.csv", pgv_m_s=0.4)
+    (warning,) = (item for item in result.warnings if item.code == "option_and_column")
+    assert warning == words
+    first, second = rows_of(tmp_path / "out.csv")
+    assert float(second["probability"]) < float(first["probability"])
+
+
+@pytest.mark.parametrize(
+    ("field", "cell", "value"),
+    [("kr_sigma", 0.1, 0.3), ("pgv_sigma", 0.1, 0.6), ("amplification", 1.0, 1.3),
+     ("kr_sigma", "", 0.3), ("amplification", "", 1.3)],
+)  # fmt: skip
+def test_empty_cells_have_the_value_for_all_rows(
+    tmp_path: Path, field: str, cell: object, value: float
+) -> None:
+    (tmp_path / "in.csv").write_text(f"{HEAD},{field}\nA,3,0.1,0.5,{cell}\nB,3,0.1,0.5,\n")
+    predict_table(tmp_path / "in.csv", tmp_path / "out.csv", inputs={field: value})
+    *_, row = rows_of(tmp_path / "out.csv")
+    expected = predict(3.0, 0.1, pgv_m_s=0.5, **{field: value}).probability
+    assert float(row["probability"]) == pytest.approx(expected, rel=1e-9)
+
+
 def test_what_is_said_of_all_rows_must_matter(answer: Answer, tmp_path: Path) -> None:
     source, target = tmp_path / "a.csv", tmp_path / "b.csv"
     source.write_text(TABLE)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 from typing import Any
 
 import numpy as np
@@ -255,6 +256,57 @@ def test_the_table_of_usual_levels_is_what_other_levels_compute(level: float) ->
 def test_levels_that_are_none(level: Any) -> None:
     with pytest.raises(InputError, match="between 0 and 1"):
         quantiles_of(level)
+
+
+def extreme_slopes(steps: FloatArray, random: np.random.Generator) -> FloatArray:
+    """Slopes of very different size, some of which nearly cancel in all steps, a column each."""
+    k = steps.shape[1]
+    spread = random.normal(size=(k, 500)) * np.exp(random.normal(0.0, 8.0, (k, 500)))
+    directions = np.linalg.svd(steps, full_matrices=False)[2].T
+    return np.hstack([spread, directions, np.eye(k), 1e50 * np.eye(k), 1e-50 * spread])
+
+
+@pytest.mark.parametrize("name", ["slopes of questions", "extreme slopes"])
+def test_sums_over_arrays_are_those_over_the_steps(name: str) -> None:
+    random = np.random.default_rng(5)
+    models = [FragilityModel.from_row(row).for_inputs(MEASURED) for row in read_models(REFERENCE)]
+    assert {model.errors.size for model in models} >= {2, 3, 4, 5, 6}
+    for model in models:
+        steps = np.array(model.errors.all_steps)
+        if name == "slopes of questions":
+            inputs = drawn_questions(model, random, 2000)
+            with np.errstate(all="ignore"):
+                x, _ = model.linear_predictor(model.completed(inputs, arrays()), arrays())
+            slopes = np.array(np.broadcast_arrays(*x.all_slopes))
+        elif model.errors.size > 6:
+            continue  # nearly equal steps of neighbouring nodes cancel in any sum of doubles
+        else:
+            slopes = extreme_slopes(steps, random)
+            x = LinearPredictor(None, tuple(slopes))
+        finite = np.isfinite(slopes).all(axis=0)
+        squares = (steps.astype(np.longdouble) @ slopes[:, finite]) ** 2
+        total, fourths = (sums[finite] for sums in model.errors.sums_of_arrays(x))
+        np.testing.assert_allclose(total, squares.sum(axis=0), rtol=6e-13)
+        np.testing.assert_allclose(fourths, (squares**2).sum(axis=0), rtol=6e-13)
+
+
+def test_single_sums_are_the_same_with_and_without_numpy(monkeypatch: pytest.MonkeyPatch) -> None:
+    (row,) = (row for row in read_models(REFERENCE) if row.name == "toppling-pgv_pga")
+    model = FragilityModel.from_row(row).for_inputs(MEASURED)
+    inputs = drawn_questions(model, np.random.default_rng(2), 50)
+    predictors = [
+        model.linear_predictor(
+            model.completed({name: float(v[i]) for name, v in inputs.items()}, SINGLE), SINGLE
+        )[0]
+        for i in range(50)
+        if inputs["kr"][i] < min(1.0, 2.0 * inputs["pgv_m_s"][i]) * inputs["pga_g"][i]
+        if inputs["kr"][i] * 9.80665 < 2.0 * inputs["pgv_m_s"][i] * np.sqrt(inputs["p2"][i])
+    ]
+    assert len(predictors) > 20
+    predictors += [LinearPredictor(None, x.all_slopes) for x in predictors]
+    with_numpy = [model.errors.sums_of_number(x) for x in predictors]
+    monkeypatch.delitem(sys.modules, "numpy")
+    assert [model.errors.sums_of_number(x) for x in predictors] == with_numpy
 
 
 def reach_over_error(steps: FloatArray, x: FloatArray) -> float:

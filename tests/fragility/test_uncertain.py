@@ -198,10 +198,25 @@ def test_draws_are_answered_by_their_weighted_mean() -> None:
 def test_extrapolation_is_said_where_part_of_the_block_is_outside() -> None:
     answer = predict(28.0, 0.1, pgv_m_s=0.6, p2_sigma=0.3)
     assert answer.in_domain
-    assert any("block uncertainty, comes from outside" in text for text in answer.warnings)
+    (text,) = (text for text in answer.warnings if "of the block uncertainty lies" in text)
+    high = find_model(None, ("p2", "kr", "pgv_m_s")).row.domain["p2"][1]
+    assert f"(mostly p² above {high:.3g} 1/s²)" in text
+    share = norm.sf(math.log(high / 28.0) / 0.3)  # ln p² has a standard deviation of 0.3
+    assert float(text.split()[0]) == pytest.approx(100.0 * share, abs=8.0)
     many = predict(np.array([28.0, 3.0]), 0.1, pgv_m_s=0.6, p2_sigma=0.3)
     assert "block uncertainty" in many.reason[0]
     assert many.reason[1] == ""
+
+
+@pytest.mark.parametrize("block", [{}, {"kr_sigma": 0.1}])
+def test_extrapolation_names_what_most_of_p_lies_beyond(block: dict[str, float]) -> None:
+    answer = predict(3.0, 0.1, pgv_m_s=0.6, pgv_sigma=0.8, **block)
+    high = find_model(None, ("p2", "kr", "pgv_m_s")).row.domain["intensity_m_s"][1]
+    (text,) = (text for text in answer.warnings if "of P comes from" in text)
+    assert f"(mostly PGV above {high:.3g} m/s)" in text
+    # P is near 1 there: the part of PGV beyond, over P
+    share = norm.sf(math.log(high / 0.6) / 0.8) / answer.probability
+    assert float(text.split()[0]) == pytest.approx(100.0 * share, rel=0.25)
 
 
 @pytest.mark.parametrize(

@@ -171,3 +171,33 @@ def test_a_long_table_is_cut_for_a_terminal() -> None:
     *_, shown = answer.tables()
     *_, every = answer.tables(verbose=True)
     assert (len(shown.rows), len(every.rows)) == (20, 30)
+
+
+def test_blocks_of_two_kinds_name_both_models() -> None:
+    x = np.geomspace(0.01, 10.0, 20)
+    curve = hazard_curve("pgv_m_s", x, 1e-3 * x**-2.0)
+    blocks: Any = {"p2": [3.0, 3.0], "kr": [0.1, 0.1], "kind": ["toppling", "rocking"]}
+    answer = hazard(curve, **blocks, component="single")
+    (line,) = (line.text for line in answer.lines() if line.label == "Model")
+    assert line == answer.model == "rocking-pgv, toppling-pgv"
+
+
+def test_the_first_of_several_curves_without_weights_is_named() -> None:
+    x = np.geomspace(0.01, 10.0, 20)
+    first, other = (hazard_curve("pgv_m_s", x, c * 1e-3 * x**-2.0) for c in (1.0, 3.0))
+    answer = hazard([first, other], 3.0, 0.1, component="single")
+    (warning,) = (item for item in answer.warnings if item.code == "first_curve")
+    assert "first of 2 hazard curves" in warning
+    assert answer.annual_rate == hazard(first, 3.0, 0.1, component="single").annual_rate
+    mean = replace(first, statistic="mean")
+    answer = hazard([mean, other], 3.0, 0.1, component="single")
+    assert "first_curve" not in [item.code for item in answer.warnings]
+
+
+def test_a_single_curve_has_no_spread_whatever_its_weight() -> None:
+    x = np.geomspace(0.01, 10.0, 20)
+    curve = hazard_curve("pgv_m_s", x, 1e-3 * x**-2.0)
+    weighted = hazard([curve], 3.0, 0.1, weights=[1.0], component="single")
+    alone = hazard(curve, 3.0, 0.1, component="single")
+    assert weighted.annual_rate == alone.annual_rate
+    assert np.isnan(weighted.logic_tree_low).all()

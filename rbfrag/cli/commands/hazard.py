@@ -49,8 +49,6 @@ def hazard(
         "1,5,20, with --joint [default: 1, 2, 5, 10, …]",
         metavar="K,K",
     ),
-    jobs: options.Jobs = None,
-    scheduler: options.Scheduler = None,
     out: str | None = option(
         "Output table with one row per block and site (.csv, .xlsx, .parquet)"
     ),
@@ -85,7 +83,6 @@ def hazard(
     from rbfrag.hazards.branches import branch_weights
     from rbfrag.hazards.curve_file import select_curves
     from rbfrag.hazards.hazard_rates import hazard_at_sites, with_drained_rates
-    from rbfrag.hazards.rate_integration import rate_part
     from rbfrag.question.classify import numbers_in
     from rbfrag.question.drained_bound import is_wet, without_water
 
@@ -114,14 +111,12 @@ def hazard(
         raise InputError(
             "--plot requires a single block at a single site: give --site, --p2 and --kr"
         )
-    elsewhere = scheduler is not None or (jobs or 1) > 1
-    run = options.runner(rate_part, jobs, scheduler) if elsewhere else None
     weight = branch_weights(weights, at.sites[0])
 
     def rates_of(block_inputs: Mapping[str, Any], **together: Any) -> HazardAnswer:
         return hazard_at_sites(
             at.sites, at.site, block_inputs, cast("CurveKeywords", meaning),
-            cast("AnsweringFields", answering), weight=weight, years=years, run=run,
+            cast("AnsweringFields", answering), weight=weight, years=years,
             **together,
         )  # fmt: skip
 

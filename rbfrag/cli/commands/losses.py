@@ -100,8 +100,8 @@ def losses(
             folder, rows, files={name: path for name, path in files.items() if path is not None},
             samples=samples, expected=expected, seed=seed, investigation_time=investigation_time,
             ses=ses, imt=None if imt is None else imt.split(","), component=component, kind=kind,
-            within_km=within_km, **answering, run=options.runner(count_years, jobs, scheduler),
-            on_progress=bar.show,
+            within_km=within_km, **answering, on_progress=bar.show,
+            run=options.runner(count_years, jobs, scheduler),
         )  # fmt: skip
     if out is not None:
         write_table(answer.table_columns(), out, excel_text=excel_text, notes=answer.warnings)

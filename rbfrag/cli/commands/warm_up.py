@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 import time
 from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
@@ -109,6 +110,29 @@ def compile_kernels() -> Iterator[str]:
         for name, text in EVENT_SET.items():
             Path(folder, f"{name}_1.csv").write_text(text, encoding="utf-8")
         losses(folder, {**blocks, "site_id": ["a"] * 3})
+
+
+def compile_search() -> None:
+    """Compile the search for the critical strength in a process of its own."""
+    from rbfrag.campaign.executors import prepare
+    from rbfrag.solver.search.critical import critical
+
+    prepare()
+    with suppress(Exception):  # the main process meets the same error and explains it
+        critical(_motion(1.0), p2=3.0)
+
+
+def compile_grid() -> None:
+    """Compile the other kernels of a toppling campaign."""
+    import numpy as np
+
+    from rbfrag.solver.excitation import kept_excitation
+    from rbfrag.solver.integrator.batch import simulate_many
+    from rbfrag.solver.integrator.block_excitation import block_excitation
+
+    excited = kept_excitation(_motion(1.0), None, "forward")
+    simulate_many(excited, p2=3.0, kr=np.array([0.3, 0.2]))
+    block_excitation(excited, p2=0.1)  # large blocks need the tables of several samples at once
 
 
 def _motion(scale: float) -> GroundMotion:

@@ -239,9 +239,10 @@ def clustered_line(
         weights: weights 1/v, shape (n,).
         events: number of each point's earthquake, shape (n,).
     """
-    import statsmodels.api as sm
+    from statsmodels.regression.linear_model import WLS
+    from statsmodels.tools import add_constant
 
-    naive = sm.WLS(y, sm.add_constant(x, has_constant="add"), weights=weights).fit()
+    naive = WLS(y, add_constant(x, has_constant="add"), weights=weights).fit()
     clustered = naive.get_robustcov_results(cov_type="cluster", groups=events)
     return ClusteredLine(
         np.asarray(naive.params),

@@ -51,7 +51,7 @@ def held_out_probabilities(
     ns, errors = arrays(), completed.errors
     with np.errstate(all="ignore"):
         for number, name in enumerate(data.event_names):
-            rows = data.event == number
+            rows = np.flatnonzero(data.event == number)
             values = {name: value[rows] for name, value in blocks.items()}
             without = completed
             if (e := place.get(name)) is not None:

@@ -184,6 +184,12 @@ def _stamped_with_all_sources(compiled: Any) -> None:
         cached._cache_file = _CacheFile(cached.cache_path, base, _stamp_of_sources())  # type: ignore[no-untyped-call]
 
 
+def is_missing_on_disk(compiled: Any) -> bool:
+    """Return whether a kernel can be kept on disk and no machine code of these sources is there."""
+    cached = getattr(compiled, "_cache", None)
+    return isinstance(cached, FunctionCache) and not cached._cache_file._load_index()  # type: ignore[no-untyped-call]
+
+
 def _once_for_literals(compiled: Any) -> None:
     """Make calls with different literals share one compilation of a kernel.
 

@@ -1,3 +1,6 @@
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 import statsmodels.api as sm
@@ -175,3 +178,15 @@ def test_a_point_that_counts_twice_equals_two_points():
     single = fit_variance(Bins(x, np.arange(10) * 20), squared, np.full(200, 2.0), 1)
     double = fit_variance(Bins(x[twice], np.arange(10) * 40), squared[twice], np.ones(400), 1)
     assert single == pytest.approx(double, rel=1e-10)
+
+
+def test_a_fit_loads_only_the_parts_of_statsmodels_that_it_needs() -> None:
+    program = (
+        "import sys, numpy as np\n"
+        "from rbfrag.fragility.fit.line import clustered_line\n"
+        "clustered_line(np.arange(4.0), np.array([0.0, 1.0, 3.0, 2.0]), np.ones(4), np.arange(4))\n"
+        "import rbfrag.fragility.fit.likelihood\n"
+        "print('statsmodels.api' in sys.modules)\n"
+    )
+    answer = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
+    assert answer.stdout == "False\n", answer.stderr
