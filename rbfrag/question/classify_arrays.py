@@ -208,12 +208,13 @@ class _BlockClassifier:
             has_restitution = ~np.isnan(restitution) if self.rows else True
             self.kinds[(self.kinds < 0) & has_restitution] = _CODES[facts.kind]
         remaining = np.ones(self.size, dtype=np.bool_)
-        for facts in kinds_by_numbers(self.inputs):
-            has_numbers = self._has_all(facts.parameters)
+        # toppling and rocking have the same parameters
+        for names in dict.fromkeys(facts.parameters for facts in kinds_by_numbers(self.inputs)):
+            has_numbers = self._has_all(names)
             remaining &= ~has_numbers
             for shape in shapes:
                 both = np.flatnonzero(has_numbers & self._has_all(shape))
-                text = TWO_DESCRIPTIONS.format(" and ".join(facts.parameters), ", ".join(shape))
+                text = TWO_DESCRIPTIONS.format(" and ".join(names), ", ".join(shape))
                 _ArrayIssues(self, both).remark(True, Diagnostic(text, "two_descriptions"))
         for shape in shapes:
             selected = remaining & self._has_all(shape)

@@ -7,6 +7,8 @@ from pathlib import Path
 
 import pytest
 
+import rbfrag
+from rbfrag.motions.sample_motions import reversal_pulse
 from rbfrag.results.numbers import percent, rounded
 from tests.cli.conftest import Rejects, Shell
 
@@ -222,3 +224,12 @@ def test_the_headline_says_whether_the_block_fails(shell: Shell, record: Path) -
     slid = shell.json("respond", record, *SLIDE)["displacement_m"]
     headline = shell("respond", record, *SLIDE).stdout.splitlines()[0]
     assert headline == f"The block slides {rounded(slid)} m along its base and stops"
+
+
+def test_the_headline_of_a_slide_says_how_far_the_block_tips() -> None:
+    motion = reversal_pulse(0.4, 0.5, 1.0, 0.005)
+    slid = rbfrag.respond(motion, ky=0.1)
+    tipped = slid.with_values(peak_theta_rad=math.radians(26.0))
+    assert slid.displacement_m is not None
+    far = rounded(slid.displacement_m)
+    assert tipped.headline() == f"The block slides {far} m along its base, tips up to 26° and stops"

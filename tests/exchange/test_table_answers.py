@@ -183,6 +183,16 @@ def test_empty_cells_have_the_value_for_all_rows(
     assert float(row["probability"]) == pytest.approx(expected, rel=1e-9)
 
 
+def test_a_geometry_next_to_the_parameters_of_a_block_is_named(tmp_path: Path) -> None:
+    (tmp_path / "in.csv").write_text(f"{HEAD},height_m,width_m\nA,6,0.1,0.5,2,0.6\nB,6,0.1,0.5,,\n")
+    result = predict_table(tmp_path / "in.csv", inputs={})
+    (warning,) = (item for item in result.warnings if item.code == "two_descriptions")
+    assert "its geometry (height_m, width_m) is not used" in warning
+    assert [int(row) for row in warning.rows] == [0]
+    first, second = (row["probability"] for row in result.blocks or ())
+    assert first == second == predict(6.0, 0.1, pgv_m_s=0.5).probability
+
+
 def test_what_is_said_of_all_rows_must_matter(answer: Answer, tmp_path: Path) -> None:
     source, target = tmp_path / "a.csv", tmp_path / "b.csv"
     source.write_text(TABLE)

@@ -21,6 +21,7 @@ from rbfrag.fragility.model import FragilityModel
 from rbfrag.fragility.model_selection import block_of, find_model, unused_measures
 from rbfrag.fragility.prediction import Prediction, answer_given
 from rbfrag.fragility.prediction_array import PredictionArray
+from rbfrag.question.question import predict
 
 G = 9.80665
 PGA = (2.175, 1.789, 1.011, 0.576, -0.272, -4.656, 2.202)
@@ -202,3 +203,13 @@ def test_a_description_says_which_blocks_are_meant() -> None:
     assert block_of(["ky"]).kind == "sliding"
     with pytest.raises(InputError, match="ky"):
         find_model(stored("pgv", (0.0,) * 5), ["ky", "displacement_m", "pgv_m_s"])
+
+
+@pytest.mark.parametrize("kind", ["rocking", "toppling"])
+@pytest.mark.parametrize("shaking", [(0.0, 1.0), (0.6, 0.0)])
+def test_no_peak_velocity_or_acceleration_is_no_shaking(
+    kind: str, shaking: tuple[float, float]
+) -> None:
+    pgv, pga = shaking
+    answer = predict(0.25, 0.062, pgv_m_s=pgv, pga_g=pga, kind=kind)
+    assert (answer.probability, answer.ci_low, answer.ci_high) == (0.0, 0.0, 0.0)
