@@ -372,7 +372,7 @@ class UncertainModel(MeanModel):
     def main_excursion(self, inputs: Mapping[str, float]) -> tuple[str, float] | None:
         """Return the variable and edge beyond which most of P lies; see :class:`MeanModel`.
 
-        Of a block under certain shaking, most of what it may be.
+        Under certain shaking: most of the block uncertainty.
         """
         columns = {n: np.atleast_1d(np.asarray(v, dtype=np.float64)) for n, v in inputs.items()}
         points, weight = self.points, self.possible.weight

@@ -254,12 +254,28 @@ def log_shaking(
     return np.asarray(np.log(np.maximum(levels, _LEAST_SHAKING)))
 
 
+def is_tabulated(part: EventYears) -> bool:
+    """Return whether scores on nodes serve: of one intensity measure, of shifts along the axes of
+    the parameter errors or of none, and of sites whose tables are small.
+    """
+    portfolio = part.portfolio
+    most = int(np.bincount(portfolio.site).max(initial=0))
+    return (
+        len(portfolio.measures) == 1
+        and most <= _MOST_ON_NODES
+        and len(part.shifted) in (0, _shifts_along_axes(portfolio))
+    )
+
+
+def _shifts_along_axes(portfolio: Portfolio) -> int:
+    """Return the number of shifted portfolios: two along each axis of each model's errors."""
+    return 2 * sum(len(row.coefficients) for row in portfolio.models)
+
+
 def tables_of(
     part: EventYears, indices: Indices | None = None, *, keep: int | None = None
 ) -> ScoreTables | None:
-    """Return the scores of blocks on nodes; None where each pair is evaluated by the models: with
-    several intensity measures, with shifts other than those along the axes of the errors, where
-    so many blocks share a site that few of the pairs may fail, or beyond `keep`.
+    """Return the scores of blocks on nodes; None unless :func:`is_tabulated`, or beyond `keep`.
 
     Args:
         part: events, or their range of u alone.
@@ -267,13 +283,7 @@ def tables_of(
         keep: values up to which the tables are made.
     """
     portfolio = part.portfolio
-    along_axes = len(part.shifted) == 2 * sum(len(row.coefficients) for row in portfolio.models)
-    most = int(np.bincount(portfolio.site).max(initial=0))
-    if (
-        len(portfolio.measures) != 1
-        or most > _MOST_ON_NODES
-        or not (along_axes or not part.shifted)
-    ):
+    if not is_tabulated(part):
         return None
     about = HazardLevel.about(portfolio.measures[0], portfolio.component)
     step, smoothing = _STEP, smoothing_of(about)[1]
@@ -286,7 +296,8 @@ def tables_of(
     rows = np.arange(portfolio.size) if indices is None else indices
     if keep is not None and (len(part.shifted) + 4) * rows.size * grid.size > keep:
         return None
-    return score_tables(portfolio, rows, about, grid, smoothing, shifts=along_axes)
+    shifts = len(part.shifted) == _shifts_along_axes(portfolio)
+    return score_tables(portfolio, rows, about, grid, smoothing, shifts=shifts)
 
 
 def _shaken(part: EventYears) -> Iterator[tuple[int, TriggeredBlocks]]:

@@ -21,6 +21,7 @@ from rbfrag.hazards.event_counts import (
     EventYears,
     PartCounts,
     count_years,
+    is_tabulated,
     laws_of,
     log_shaking,
     shift_error,
@@ -107,7 +108,7 @@ def event_losses(
     pairs_at_once = PAIRS_AT_ONCE
     if samples and u.size:
         common = common._replace(tables=tables_of(common, keep=MOST_KEPT))
-        if common.tables is None:  # each part makes its own tables: fewer and larger parts
+        if common.tables is None and is_tabulated(common):  # each part makes its own tables
             pairs_at_once *= LARGER_PARTS
     groups: list[NDArray[np.intp]] = []
     if samples or means is None:

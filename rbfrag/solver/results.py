@@ -327,7 +327,7 @@ class Response(Result):
             return
         facts = KINDS.get(self.kind)
         verb = "fails" if facts is None else facts.verb
-        # without a displacement limit a slide is told by its length
+        # a slide without a displacement limit has a length, not a verdict
         slides = facts is None or "displacement_m" in facts.parameters
         rotates = self.peak_theta_rad is not None
         if (

@@ -12,6 +12,7 @@ from scipy.special import ndtr, ndtri
 from rbfrag.hazards import event_counts
 from rbfrag.hazards.event_counts import EventYears, TriggeredBlocks, _noticeable, tables_of
 from rbfrag.hazards.event_set import TOLERANCE, Duration, EventSet
+from rbfrag.hazards.losses import event_losses
 from rbfrag.hazards.portfolio import Portfolio
 from rbfrag.hazards.score_tables import MEAN, MEDIAN, VARIANCE
 from rbfrag.question.components import component_named
@@ -136,3 +137,32 @@ def test_the_tolerance_changes_no_rate_beyond_sampling(monkeypatch: pytest.Monke
     np.testing.assert_allclose(default.any_fails, exact.any_fails, atol=4.0 * np.sqrt(0.5 / 4000))
     error = 4.0 * np.sqrt(exact.counts.events[1, 0] / 4000)
     assert (np.abs(default.counts.events[0, 0] - exact.counts.events[0, 0]) < error).all()
+
+
+def test_tables_of_each_site_give_the_failures_of_those_kept(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    part, _ = part_of("toppling", "pgv_m_s", ("p2", "kr"), "single")
+    from_one = event_losses(part.events, part.portfolio, samples=50)
+    monkeypatch.setattr("rbfrag.hazards.losses.MOST_KEPT", 0)
+    by_site = event_losses(part.events, part.portfolio, samples=50)
+    assert by_site.as_dict() == from_one.as_dict()
+
+
+@pytest.mark.parametrize(("most_kept", "larger"), [(0, True), (1 << 26, False)])
+def test_parts_are_larger_only_where_each_makes_tables(
+    monkeypatch: pytest.MonkeyPatch, most_kept: int, larger: bool
+) -> None:
+    part, _ = part_of("toppling", "pgv_m_s", ("p2", "kr"), "single")
+    monkeypatch.setattr("rbfrag.hazards.losses.MOST_KEPT", most_kept)
+    monkeypatch.setattr("rbfrag.hazards.losses.PAIRS_AT_ONCE", BLOCKS)
+    sizes: list[int] = []
+
+    def run(parts: Any, number: int, shared: EventYears) -> Any:
+        sizes.append(number)
+        return (event_counts.count_years(shared, batch) for batch in parts)
+
+    event_losses(part.events, part.portfolio, samples=1, run=run)
+    monkeypatch.setattr(event_counts, "_MOST_ON_NODES", 0)  # the models answer each pair
+    event_losses(part.events, part.portfolio, samples=1, run=run)
+    assert [number == 1 for number in sizes] == [larger, False]
